@@ -4,7 +4,7 @@
 
 use super::judge::Judgement;
 use super::plan::{cut_to_budget, doubling_plan};
-use super::small_lamps::is_unmet;
+use super::small_lamps::few_meetings;
 use crate::film::Film;
 use crate::integrator::{BlockWork, SamplePlan};
 use crate::sampler::Half;
@@ -50,17 +50,6 @@ pub(super) fn while_far(film: &Film, judgement: &Judgement, rung: f64, max_sampl
     Some(cut_to_budget(plan, gains(film, &energies), most_at_once(film)))
 }
 
-/// Energies of which pixels with known lamps that few samples have met all have the mean of these. A pixel that was lucky is bright, so that
-/// its threshold is high: lamps far out of focus were 7.3 ± 1.0 % too bright with 32 samples a pixel.
-fn with_unmet_alike(film: &Film, mut energies: Plane) -> Plane {
-    let unmet: Vec<usize> = (0..film.pixel_count()).filter(|&pixel| is_unmet(film, pixel)).collect();
-    let of_unmet =
-        || unmet.iter().map(|&pixel| f64::from(energies.values()[pixel])).filter(|energy| energy.is_finite());
-    let mean = of_unmet().sum::<f64>() / of_unmet().count().max(1) as f64;
-    unmet.iter().for_each(|&pixel| energies.values_mut()[pixel] = mean as f32);
-    energies
-}
-
 /// A plan cut to so many samples: where these do most for the picture.
 pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u64) -> SamplePlan {
     if plan.samples() <= most {
@@ -93,6 +82,17 @@ impl Energies {
     fn of_half(&self, half: Half) -> &[f32] {
         self.of_halves.as_ref().map_or(&self.whole, |halves| &halves[half.index()]).values()
     }
+}
+
+/// Energies of which pixels with known lamps that few samples have met all have the mean of these. A pixel that was lucky is bright, so that
+/// its threshold is high: lamps far out of focus were 7.3 ± 1.0 % too bright with 32 samples a pixel.
+fn with_unmet_alike(film: &Film, mut energies: Plane) -> Plane {
+    let unmet: Vec<usize> = (0..film.pixel_count()).filter(|&pixel| few_meetings(film, pixel).is_some()).collect();
+    let of_unmet =
+        || unmet.iter().map(|&pixel| f64::from(energies.values()[pixel])).filter(|energy| energy.is_finite());
+    let mean = of_unmet().sum::<f64>() / of_unmet().count().max(1) as f64;
+    unmet.iter().for_each(|&pixel| energies.values_mut()[pixel] = mean as f32);
+    energies
 }
 
 /// What one more sample takes away of a half's share of its pixel's visible energy, e/n: by its own count n, not the pixel's. The other half's

@@ -23,6 +23,8 @@ const MOST_SAMPLES: u64 = 1 << 20;
 /// adapt as with 512 a pixel of one of 128×72, to 3 %.
 const COARSE_SIDE: u32 = 64;
 const MOST_COARSE_SAMPLES: u64 = 1 << 21;
+/// A brief glimpse's side is at most this share of the picture's: it takes a sample for each of the picture's pixels.
+const SIDES_OF_A_BRIEF_GLIMPSE: u32 = 4;
 /// Change of light by a doubling of the samples below which it is.
 const STEADY: f32 = 0.01;
 
@@ -59,7 +61,19 @@ pub fn coarse_glimpse_for(
     steady_light_for(operator, &tracer, nits_per_unit, MOST_COARSE_SAMPLES, made_of_it).0
 }
 
-/// The same from where a camera is now, by a tracer that is there and works by the same settings again in the end.
+/// What one operator asks for as a few pixels see it, however noisy: for telling which of many views are lighter.
+pub fn brief_glimpse_for(
+    operator: &dyn ToneOperator,
+    scene: Arc<Scene>,
+    trace: &TraceSettings,
+    nits_per_unit: f64,
+) -> SceneLight {
+    let longest_side = (trace.width.max(trace.height) / SIDES_OF_A_BRIEF_GLIMPSE).clamp(1, COARSE_SIDE);
+    let tracer = PathTracer::new(scene, no_longer_than(longest_side, trace));
+    Seen::of(&pilot(&tracer), &tracer, nits_per_unit).light_for(operator, tracer.settings().width)
+}
+
+/// A steady glimpse from where a camera is now, by a tracer that is there and works by the same settings again in the end.
 pub fn steady_glimpse_from(
     camera: &Camera,
     tracer: &mut PathTracer,
@@ -110,10 +124,10 @@ fn steady_light_for(
     most_samples: u64,
     made_of_it: &dyn Fn(&SceneLight) -> Vec<f32>,
 ) -> (SceneLight, f32) {
-    let width = tracer.settings().width as usize;
-    let light_of = |seen: &Seen| where_covered(SceneLight::of(operator, width, &seen.rgb_cd_m2), seen.alpha.as_deref());
-    let steady = Steady::of(tracer, nits_per_unit, most_samples, &|seen| made_of_it(&light_of(seen)));
-    (light_of(&steady.seen), steady.last_change)
+    let width = tracer.settings().width;
+    let made_of_it = |seen: &Seen| made_of_it(&seen.light_for(operator, width));
+    let steady = Steady::of(tracer, nits_per_unit, most_samples, &made_of_it);
+    (steady.seen.light_for(operator, width), steady.last_change)
 }
 
 /// What a glimpse sees.
@@ -133,6 +147,11 @@ impl Seen {
             return Self { rgb_cd_m2: estimate.rgb_cd_m2, alpha: Some(film.coverage()) };
         }
         Self { rgb_cd_m2: guide_rgb(film, &estimate), alpha: None }
+    }
+
+    /// What an operator asks for of a picture of this width.
+    fn light_for(&self, operator: &dyn ToneOperator, width: u32) -> SceneLight {
+        where_covered(SceneLight::of(operator, width as usize, &self.rgb_cd_m2), self.alpha.as_deref())
     }
 }
 
@@ -201,6 +220,7 @@ fn glimpse_size(longest_side: u32, width: u32, height: u32) -> (u32, u32) {
 mod tests {
     use super::*;
     use crate::scene::load::{LoadOptions, load};
+    use fechner_perception::tone::{ToneSettings, operator_with};
     use std::path::Path;
 
     /// Where few samples spread lamps over the picture, a glimpse goes on until it has the light of a render. With a pilot's samples white
@@ -224,6 +244,28 @@ mod tests {
         // Of six seeds with the 64 samples that it ends with white scatters by 2.6 %: three deviations from one with 128.
         assert!((steady / right - 1.0).abs() < 0.1, "{steady} cd/m² at a twentieth, in the whole {right}");
         assert!(few < 0.5 * right, "{few} cd/m² by a pilot: the scene shows nothing");
+    }
+
+    /// By one operator, of the whole picture, and of a transparent one where it is covered.
+    #[test]
+    fn a_brief_glimpse_tells_how_light_a_view_is() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+        let scene = Arc::new(load(&file, &LoadOptions::default()).expect("our own scene"));
+        let operator = operator_with("constant", &ToneSettings::default()).expect("an operator");
+        for transparent in [false, true] {
+            let trace = TraceSettings { transparent, ..TraceSettings::new(96, 96, 0) };
+            let ln_mean = |light: &SceneLight| {
+                let lit = light.luminance_cd_m2().values().iter().filter(|&&cd_m2| cd_m2 > 0.0);
+                lit.clone().map(|&cd_m2| f64::from(cd_m2).ln()).sum::<f64>() / lit.count() as f64
+            };
+            let brief = brief_glimpse_for(operator.as_ref(), Arc::clone(&scene), &trace, scene.nits_per_unit);
+            let steady =
+                steady_glimpse_for(operator.as_ref(), Arc::clone(&scene), &trace, scene.nits_per_unit, &|_| Vec::new());
+            let ratio = (ln_mean(&brief) - ln_mean(&steady.0)).exp();
+            println!("transparent {transparent}: {ratio}");
+            assert_eq!(brief.luminance_cd_m2().width(), 24);
+            assert!((ratio - 1.0).abs() < 0.1, "transparent {transparent}: {ratio} times as light");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
 use super::missed::FoundLight;
 use super::settings::Limits;
-use crate::film::{Film, KnownLamps};
+use crate::film::Film;
 use fechner_perception::Plane;
 use fechner_perception::tone::Pixel;
 
@@ -63,10 +63,7 @@ pub(super) fn unmet_noise(
     let width = film.width() as usize;
     Some(Plane::from_fn(width, film.height() as usize, |x, y| {
         let index = y * width + x;
-        if !is_unmet(film, index) {
-            return 0.0;
-        }
-        let expected_meetings = expected_meetings(film, lamps, index);
+        let Some(expected_meetings) = few_meetings(film, index) else { return 0.0 };
         let light = nits_per_unit * f64::from(lamps.light(index));
         let of_one_meeting = light / expected_meetings;
         let besides = (f64::from(found.mean_cd_m2.values()[index]) - light).max(0.0);
@@ -77,14 +74,10 @@ pub(super) fn unmet_noise(
     }))
 }
 
-/// Whether a pixel has known lamps that its samples are expected to have met fewer than [`MEETINGS`] times.
-pub(super) fn is_unmet(film: &Film, pixel: usize) -> bool {
-    let expected = film.known_lamps.as_ref().map_or(0.0, |lamps| expected_meetings(film, lamps, pixel));
-    expected > 0.0 && expected < MEETINGS
-}
-
-fn expected_meetings(film: &Film, lamps: &KnownLamps, pixel: usize) -> f64 {
-    f64::from(lamps.share(pixel)) * f64::from(film.samples(pixel))
+/// How often a pixel's samples are expected to have met its known lamps, where that is fewer than [`MEETINGS`] times; `None` where it has none.
+pub(super) fn few_meetings(film: &Film, pixel: usize) -> Option<f64> {
+    let expected = f64::from(film.known_lamps.as_ref()?.share(pixel)) * f64::from(film.samples(pixel));
+    (expected > 0.0 && expected < MEETINGS).then_some(expected)
 }
 
 /// The mean of what depends on a count that is `expected` on average, but for a hundred-thousandth of the cases.
@@ -103,7 +96,7 @@ fn mean_of_poisson(expected: f64, of_count: impl Fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::BlockSum;
+    use crate::film::{BlockSum, KnownLamps};
     use crate::integrator::{BlockWork, FirstHit, PathSample};
     use crate::sampler::Half;
     use glam::Vec3;

@@ -15,7 +15,7 @@ pub(super) const LEAST_SAVING: f64 = 0.05;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
     /// Predicted visibility is at most the target on 99.9 % of the picture and nowhere above twice the target; of adaptive sampling, after
-    /// an audit has agreed where one is made.
+    /// an audit has agreed where one is made; none is where the last sample of a budget has reached it.
     Visibility,
     /// The time was up.
     Time,

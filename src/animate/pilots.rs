@@ -2,12 +2,10 @@
 
 use super::track::{Track, goal_of};
 use super::{SceneSource, ShotSettings};
-use crate::adaptive::judge::guide_rgb;
-use crate::adaptive::plan::pilot_plan;
-use crate::film::Film;
-use crate::integrator::{PILOT_SAMPLES_A_PIXEL, PathTracer, TraceSettings};
+use crate::adaptive::glimpse::brief_glimpse_for;
+use crate::integrator::PILOT_SAMPLES_A_PIXEL;
 use crate::scene::load::LoadError;
-use fechner_perception::tone::{SceneLight, ToneOperator};
+use fechner_perception::tone::ToneOperator;
 
 /// Frames that are piloted, if there are as many.
 const PILOTED_FRAMES: usize = 9;
@@ -19,10 +17,6 @@ const SHARE_OF_PILOTS: u64 = 10;
 const STEADY_RATIO: f64 = 1.25;
 /// No stretch without a pilot is longer than one in so many of the shot, however much its light changes elsewhere.
 const LEAST_STRETCHES: usize = 4;
-/// A brief look's side is one in so many of the frame's: by a pilot's samples it takes one for each pixel of the frame.
-const SIDES_OF_A_BRIEF_LOOK: u32 = 4;
-/// Longest side of a brief look in pixels.
-const LONGEST_BRIEF_SIDE: u32 = 64;
 
 /// The frames of a shot to pilot, in order, counted from its first.
 pub(super) fn piloted_frames(
@@ -61,14 +55,8 @@ fn brief_light(
     frame: u32,
 ) -> Result<f64, LoadError> {
     let scene = source.at(shot.seconds(f64::from(frame)))?;
-    let TraceSettings { width, height, .. } = shot.trace;
-    let parts = width.max(height).div_ceil(LONGEST_BRIEF_SIDE).max(SIDES_OF_A_BRIEF_LOOK);
-    let [width, height] = [width, height].map(|side| (side / parts).max(1));
-    let tracer = PathTracer::new(scene, TraceSettings { width, height, crop: None, ..shot.trace });
-    let mut film = Film::new(width, height);
-    tracer.trace(&pilot_plan(&film, PILOT_SAMPLES_A_PIXEL), &mut film, &|_| {});
-    let rgb_cd_m2 = guide_rgb(&film, &film.estimate(shot.nits_per_unit));
-    Ok(goal_of(&SceneLight::of(operator, width as usize, &rgb_cd_m2), shot, operator).cones_cd_m2)
+    let light = brief_glimpse_for(operator, scene, &shot.trace, shot.nits_per_unit);
+    Ok(goal_of(&light, shot, operator).cones_cd_m2)
 }
 
 /// Pilots that light may ask for.

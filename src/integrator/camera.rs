@@ -86,9 +86,7 @@ impl CameraRays {
         let direction = moved.transform_vector3a(direction).normalize();
         Ray { time: sample.time, ..Ray::new(moved.transform_point3a(origin), direction) }
     }
-}
 
-impl CameraRays {
     /// Whether rays begin at more than one place: of a picture that is seen without perspective.
     pub(super) fn is_parallel(&self) -> bool {
         self.parallel

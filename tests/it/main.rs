@@ -67,6 +67,7 @@ mod maps;
 mod mishaps;
 mod mitsuba_cameras;
 mod mitsuba_format;
+mod mitsuba_textures;
 mod mutations;
 mod no_allocation;
 mod overscan;

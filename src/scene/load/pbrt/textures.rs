@@ -2,6 +2,7 @@
 
 mod combined;
 
+use self::combined::Combination;
 use super::super::error::{LoadError, no_such};
 use super::super::texture::{Adjust, IfMissing, Number, Picture, Request, is_grey};
 use super::Reader;
@@ -65,9 +66,9 @@ impl Reader<'_> {
                 let (lookup, scale) = self.image(parameters, None)?;
                 Ok(ColorInput { factor: Vec3::splat(scale), texture: Some(lookup) })
             }
-            "scale" => self.scaled(parameters, name, depth),
-            "mix" => self.mixed(parameters, name, depth),
-            "checkerboard" => self.checkered(parameters, name, depth),
+            "scale" => self.scaled(Combination { parameters, name, depth }),
+            "mix" => self.mixed(Combination { parameters, name, depth }),
+            "checkerboard" => self.checkered(Combination { parameters, name, depth }),
             other => {
                 self.average(parameters, name, &format!("a texture of type \"{other}\": grey 0.5"));
                 Ok(ColorInput::constant(Vec3::splat(0.5)))
@@ -99,9 +100,9 @@ impl Reader<'_> {
                 let (lookup, factor) = self.image(parameters, Some(Number::AlphaOrMean))?;
                 Ok(ScalarInput { factor, texture: Some((lookup, 0)) })
             }
-            "scale" => self.scaled(parameters, name, depth),
-            "mix" => self.mixed(parameters, name, depth),
-            "checkerboard" => self.checkered(parameters, name, depth),
+            "scale" => self.scaled(Combination { parameters, name, depth }),
+            "mix" => self.mixed(Combination { parameters, name, depth }),
+            "checkerboard" => self.checkered(Combination { parameters, name, depth }),
             other => {
                 self.average(parameters, name, &format!("a texture of type \"{other}\": 0.5"));
                 Ok(ScalarInput::constant(0.5))

@@ -8,6 +8,15 @@ use crate::scene::{ColorInput, ScalarInput, TextureLookup, Wrap};
 use glam::{Vec2, Vec3};
 use std::ops::Mul;
 
+/// A texture that is made of others.
+#[derive(Clone, Copy)]
+pub(super) struct Combination<'a> {
+    pub(super) parameters: &'a Parameters,
+    pub(super) name: &'a str,
+    /// Of textures that use textures.
+    pub(super) depth: usize,
+}
+
 /// What textures of colours and of numbers have in common.
 pub(super) trait Input: Copy {
     type Value: Copy + Mul<f32, Output = Self::Value>;
@@ -24,13 +33,7 @@ pub(super) trait Input: Copy {
     fn between(first: Self::Value, second: Self::Value, amount: f32) -> Self::Value;
 
     /// A value, or another texture.
-    fn operand(
-        reader: &mut Reader<'_>,
-        parameters: &Parameters,
-        name: &str,
-        default: f32,
-        depth: usize,
-    ) -> Result<Self, LoadError>;
+    fn operand(reader: &mut Reader<'_>, of: Combination<'_>, name: &str, default: f32) -> Result<Self, LoadError>;
 
     /// The colour that stands for it where only a constant has a place.
     fn mean_color(&self, reader: &Reader<'_>) -> Result<Vec3, LoadError>;
@@ -59,14 +62,8 @@ impl Input for ColorInput {
         first.lerp(second, amount)
     }
 
-    fn operand(
-        reader: &mut Reader<'_>,
-        parameters: &Parameters,
-        name: &str,
-        default: f32,
-        depth: usize,
-    ) -> Result<Self, LoadError> {
-        reader.color_operand(parameters, name, Vec3::splat(default), depth)
+    fn operand(reader: &mut Reader<'_>, of: Combination<'_>, name: &str, default: f32) -> Result<Self, LoadError> {
+        reader.color_operand(of.parameters, name, Vec3::splat(default), of.depth)
     }
 
     fn mean_color(&self, reader: &Reader<'_>) -> Result<Vec3, LoadError> {
@@ -98,14 +95,8 @@ impl Input for ScalarInput {
         first + (second - first) * amount
     }
 
-    fn operand(
-        reader: &mut Reader<'_>,
-        parameters: &Parameters,
-        name: &str,
-        default: f32,
-        depth: usize,
-    ) -> Result<Self, LoadError> {
-        reader.scalar_operand(parameters, name, default, depth)
+    fn operand(reader: &mut Reader<'_>, of: Combination<'_>, name: &str, default: f32) -> Result<Self, LoadError> {
+        reader.scalar_operand(of.parameters, name, default, of.depth)
     }
 
     fn mean_color(&self, reader: &Reader<'_>) -> Result<Vec3, LoadError> {
@@ -114,62 +105,47 @@ impl Input for ScalarInput {
 }
 
 impl Reader<'_> {
-    pub(super) fn scaled<I: Input>(
-        &mut self,
-        parameters: &Parameters,
-        name: &str,
-        depth: usize,
-    ) -> Result<I, LoadError> {
-        let base = I::operand(self, parameters, "tex", 1.0, depth)?;
-        let scale = self.scalar_operand(parameters, "scale", 1.0, depth)?;
+    pub(super) fn scaled<I: Input>(&mut self, of: Combination<'_>) -> Result<I, LoadError> {
+        let base = I::operand(self, of, "tex", 1.0)?;
+        let scale = ScalarInput::operand(self, of, "scale", 1.0)?;
         let (rest, texture) = match (base.texture(), scale.texture()) {
             (None, texture) | (texture, None) => (scale.factor, texture),
             (texture, Some(_)) => {
-                self.average(parameters, name, "its scale's texture: its mean");
+                self.average(of.parameters, of.name, "its scale's texture: its mean");
                 (self.mean_of_number(&scale)?, texture)
             }
         };
         Ok(I::of(base.factor() * rest, texture))
     }
 
-    pub(super) fn mixed<I: Input>(
-        &mut self,
-        parameters: &Parameters,
-        name: &str,
-        depth: usize,
-    ) -> Result<I, LoadError> {
-        let amount = self.amount(parameters, name, depth)?;
-        let first = I::operand(self, parameters, "tex1", 0.0, depth)?;
-        let second = I::operand(self, parameters, "tex2", 1.0, depth)?;
+    pub(super) fn mixed<I: Input>(&mut self, of: Combination<'_>) -> Result<I, LoadError> {
+        let amount = self.amount(of)?;
+        let first = I::operand(self, of, "tex1", 0.0)?;
+        let second = I::operand(self, of, "tex2", 1.0)?;
         if first.texture().is_none() && second.texture().is_none() {
             return Ok(I::of(I::between(first.factor(), second.factor(), amount), None));
         }
-        self.average(parameters, name, "the mix of textures: the heavier one");
+        self.average(of.parameters, of.name, "the mix of textures: the heavier one");
         Ok(if amount < 0.5 { first } else { second })
     }
 
     /// The share of a mix's second part, which is one number here.
-    fn amount(&mut self, parameters: &Parameters, name: &str, depth: usize) -> Result<f32, LoadError> {
-        let amount = self.scalar_operand(parameters, "amount", 0.5, depth)?;
+    fn amount(&mut self, of: Combination<'_>) -> Result<f32, LoadError> {
+        let amount = ScalarInput::operand(self, of, "amount", 0.5)?;
         if amount.texture.is_some() {
-            self.average(parameters, name, "its amount's texture: its mean");
+            self.average(of.parameters, of.name, "its amount's texture: its mean");
         }
         self.mean_of_number(&amount)
     }
 
-    pub(super) fn checkered<I: Input>(
-        &mut self,
-        parameters: &Parameters,
-        name: &str,
-        depth: usize,
-    ) -> Result<I, LoadError> {
-        let even = I::operand(self, parameters, "tex1", 1.0, depth)?;
-        let odd = I::operand(self, parameters, "tex2", 0.0, depth)?;
+    pub(super) fn checkered<I: Input>(&mut self, of: Combination<'_>) -> Result<I, LoadError> {
+        let even = I::operand(self, of, "tex1", 1.0)?;
+        let odd = I::operand(self, of, "tex2", 0.0)?;
         if even.texture().is_some() || odd.texture().is_some() {
-            self.average(parameters, name, "textures inside a checkerboard: their mean colours");
+            self.average(of.parameters, of.name, "textures inside a checkerboard: their mean colours");
         }
         let colors = [even.mean_color(self)?, odd.mean_color(self)?];
-        let lookup = self.checkerboard(parameters, colors)?;
+        let lookup = self.checkerboard(of.parameters, colors)?;
         Ok(I::of(I::value(1.0), Some(lookup)))
     }
 
