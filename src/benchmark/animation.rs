@@ -1,5 +1,5 @@
 //! What motion hides: the frames of a shot by the rule for motion and by the rule for stills, both asked for one visibility,
-//! and evenly sampled ones of the same judged quality.
+//! the shot with as many samples as the first as its budget, and evenly sampled frames of the same judged quality.
 //!
 //! Judged as a video by ColorVideoVDP, which no rule optimises, against frames of many samples by other seeds. Not for
 //! stills.
@@ -13,6 +13,7 @@ use super::reference::trace_up_to;
 use super::{tone_operator, viewing};
 use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings, Sampling};
 use crate::adaptive::{Quiet, render};
+use crate::animate::budget::Needs;
 use crate::animate::eye::Eye;
 use crate::animate::track::Track;
 use crate::animate::velocity::VelocityOf;
@@ -66,6 +67,12 @@ pub struct AnimationRow {
     pub still_jod: f64,
     /// Samples a pixel with which evenly sampled frames look like those of the rule for motion.
     pub uniform_spp: Reached,
+    /// Mean samples a pixel of the shot that has those of the rule for motion as its budget, and no visibility to stop at.
+    pub budget_spp: f64,
+    /// What its frames look like as a video.
+    pub budget_jod: f64,
+    /// Samples a pixel with which evenly sampled frames look like those.
+    pub uniform_spp_of_budget: Reached,
     /// Visibility of the error in single frames by the rule for motion, at the 99th percentile.
     pub visibility: f64,
     /// Root mean square visibility of what changes from frame to frame by the rule for motion, what moves brought together.
@@ -118,6 +125,13 @@ impl SceneSource for Files<'_> {
 /// Displayed light of each frame, linear RGB in cd/m².
 type Frames = Vec<Vec<f32>>;
 
+/// Frames of a shot.
+struct Rendition {
+    /// Mean samples a pixel.
+    spp: f64,
+    frames: Frames,
+}
+
 /// Runs every shot.
 ///
 /// # Errors
@@ -137,6 +151,7 @@ pub fn animation(settings: &AnimationSettings, say: &dyn Fn(&str)) -> Result<Vec
 struct Bench<'a> {
     settings: &'a AnimationSettings,
     name: String,
+    source: Files<'a>,
     shot: ShotSettings,
     track: Track,
     scenes: Vec<Arc<Scene>>,
@@ -173,7 +188,7 @@ impl<'a> Bench<'a> {
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;
         let scenes = (shot.first..=shot.last).map(|frame| source.at(shot.seconds(f64::from(frame))));
         let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { settings, name, shot, track, scenes })
+        Ok(Self { settings, name, source, shot, track, scenes })
     }
 
     fn row(&self) -> Result<AnimationRow> {
@@ -183,12 +198,15 @@ impl<'a> Bench<'a> {
             let rate = self.shot.frames_per_second;
             video_jod(&self.shot.viewing.display, size, rate, [frames, reference.clone()])
         };
-        let (motion_spp, motion) = self.adaptive(false)?;
-        let (still_spp, still) = self.adaptive(true)?;
+        let Rendition { spp: motion_spp, frames: motion } =
+            self.adaptive(&self.variant(false, self.shot.limits), &self.track)?;
+        let Rendition { spp: still_spp, frames: still } =
+            self.adaptive(&self.variant(true, self.shot.limits), &self.track)?;
+        let Rendition { spp: budget_spp, frames: of_budget } = self.with_budget(motion_spp.round() as u32)?;
         let tracers: Vec<PathTracer> = (0..self.scenes.len()).map(|index| self.tracer(index, 0)).collect();
         let judge = FlickerJudge::new(&reference, &tracers, &self.scenes, &self.shot.viewing)?;
         let steady = judge.judge(&motion);
-        let (motion_jod, still_jod) = (jod(motion)?, jod(still)?);
+        let (motion_jod, still_jod, budget_jod) = (jod(motion)?, jod(still)?, jod(of_budget)?);
         let counts: Vec<u32> =
             (2..).map(|power| 1 << power).take_while(|n| 2 * n <= self.settings.reference_spp).collect();
         let (mut curve, mut steadiness) = (Vec::new(), Vec::new());
@@ -204,31 +222,52 @@ impl<'a> Bench<'a> {
             still_spp,
             still_jod,
             uniform_spp: Reached::by(&curve, motion_jod),
+            budget_spp,
+            budget_jod,
+            uniform_spp_of_budget: Reached::by(&curve, budget_jod),
             visibility: steady.visibility,
             flicker: steady.flicker,
             uniform_flicker: flicker_at(&steadiness, steady.visibility),
         })
     }
 
-    /// Mean samples a pixel and the frames by one of the rules.
-    fn adaptive(&self, pausable: bool) -> Result<(f64, Frames)> {
-        let shot = ShotSettings {
+    /// The shot for people who may pause it or not, within other limits.
+    fn variant(&self, pausable: bool, limits: Limits) -> ShotSettings {
+        ShotSettings {
             pausable,
+            limits,
             viewing: self.shot.viewing.clone(),
             gaze: None,
             denoiser: self.shot.denoiser.clone(),
             ..self.shot
-        };
+        }
+    }
+
+    /// The frames of a shot by the loop.
+    fn adaptive(&self, shot: &ShotSettings, track: &Track) -> Result<Rendition> {
         let (mut samples, mut frames) = (0, Vec::new());
         for index in 0..self.scenes.len() {
             let operator = tone_operator(&self.scenes[index])?;
-            let settings: LoopSettings = shot.frame_settings(operator, &self.track.frames[index]);
+            let settings: LoopSettings = shot.frame_settings(operator, &track.frames[index]);
             let rendered = render(&self.tracer(index, 0), &settings, &Quiet)?;
             samples += rendered.film.total_samples();
             frames.push(self.displayed(index, rendered.judgement.picture()));
         }
         let pixels = f64::from(self.settings.size.0) * f64::from(self.settings.size.1);
-        Ok((samples as f64 / pixels / frames.len() as f64, frames))
+        Ok(Rendition { spp: samples as f64 / pixels / frames.len() as f64, frames })
+    }
+
+    /// The frames of a budget for the whole shot, as `animate --spp` spends it.
+    fn with_budget(&self, mean_samples: u32) -> Result<Rendition> {
+        let limits = Limits { visibility: None, mean_samples: Some(mean_samples), ..self.shot.limits };
+        let shot = self.variant(false, limits);
+        let first_scene = self.source.at(0.0)?;
+        tone_operator(&first_scene)?;
+        let operator = || tone_operator(&first_scene).expect("there was one before");
+        let mut track = Track::make(&self.source, &shot, operator().as_ref(), &|_| {})?;
+        let needs = Needs::of(&self.source, &shot, &operator, &track)?;
+        track.spread(&needs, mean_samples, limits.last_rung());
+        self.adaptive(&shot, &track)
     }
 
     /// Frames of many samples by other seeds, never denoised.

@@ -1,8 +1,8 @@
 //! What `bench` prints: tables in Markdown, for documents.
 
 use fechner::benchmark::{
-    AnimationRow, ArmSummary, Bound, Calibration, DenoisingResults, Need, Quality, RaceMean, intervals_in_words,
-    mean_ratio,
+    AnimationRow, ArmSummary, Bound, Calibration, DenoisingResults, Need, Quality, RaceMean, Reached,
+    intervals_in_words, mean_ratio,
 };
 
 /// What each arm saves, over scenes.
@@ -103,19 +103,27 @@ pub(super) fn print_animation(denoiser: Option<&str>, rows: &[AnimationRow]) {
     }
     answer!(
         "| shot | frames a second | motion: spp, JOD | still: spp, JOD | still / motion | even, as good: spp | even / motion | \
-         flicker | of even, at equal visibility |"
+         as a budget: spp, JOD | even, as good: spp | even / budget | flicker | of even, at equal visibility |"
     );
-    answer!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    answer!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for row in rows {
         let ratio = row.still_spp / row.motion_spp;
-        let even_over_motion =
-            row.uniform_spp.known().map_or_else(|| "–".to_owned(), |even| format!("{:.2}", even / row.motion_spp));
-        let even = format!("{:.0} | {even_over_motion}", row.uniform_spp);
+        let even_over = |even: Reached, spp: f64| {
+            let ratio = even.known().map_or_else(|| "–".to_owned(), |even| format!("{:.2}", even / spp));
+            format!("{even:.0} | {ratio}")
+        };
+        let even = even_over(row.uniform_spp, row.motion_spp);
+        let budget = format!(
+            "{:.0}, {:.2} | {}",
+            row.budget_spp,
+            row.budget_jod,
+            even_over(row.uniform_spp_of_budget, row.budget_spp)
+        );
         let AnimationRow { scene, frames_per_second, motion_spp, motion_jod, still_spp, still_jod, flicker, .. } = row;
         let even_flicker = row.uniform_flicker.map_or_else(|| "not tried".to_owned(), |even| format!("{even:.2}"));
         answer!(
             "| {scene} | {frames_per_second} | {motion_spp:.0}, {motion_jod:.2} | {still_spp:.0}, {still_jod:.2} | \
-             {ratio:.2} | {even} | {flicker:.2} | {even_flicker} |"
+             {ratio:.2} | {even} | {budget} | {flicker:.2} | {even_flicker} |"
         );
     }
     let mut rates: Vec<f64> = rows.iter().map(|row| row.frames_per_second).collect();
@@ -125,8 +133,11 @@ pub(super) fn print_animation(denoiser: Option<&str>, rows: &[AnimationRow]) {
         let of_rate = || rows.iter().filter(|row| row.frames_per_second == rate);
         let still = geometric_mean(of_rate().map(|row| Some(row.still_spp / row.motion_spp)));
         let even = geometric_mean(of_rate().map(|row| Some(row.uniform_spp.known()? / row.motion_spp)));
+        let budget = geometric_mean(of_rate().map(|row| Some(row.uniform_spp_of_budget.known()? / row.budget_spp)));
         let flicker = geometric_mean(of_rate().map(|row| Some(row.flicker / row.uniform_flicker?)));
-        answer!("at {rate}: still / motion {still}, even / motion {even}, flicker over that of even {flicker}");
+        answer!(
+            "at {rate}: still / motion {still}, even / motion {even}, even / budget {budget}, flicker over that of even {flicker}"
+        );
     }
 }
 
@@ -144,7 +155,6 @@ fn geometric_mean(values: impl Iterator<Item = Option<f64>>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fechner::benchmark::Reached;
 
     #[test]
     fn means_say_what_they_leave_out() {
