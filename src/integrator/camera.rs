@@ -1,7 +1,10 @@
 //! Rays of the camera: perspective or orthographic, through a thin lens, from where it is while the shutter is open.
 
+mod at;
+
 use crate::geometry::Ray;
 use crate::scene::{Camera, CameraAxes, Motion, Projection, ScreenWindow};
+pub(super) use at::CameraAt;
 use glam::{Vec2, Vec3, Vec3A};
 use std::f32::consts::FRAC_PI_4;
 
@@ -97,76 +100,25 @@ impl CameraRays {
         self.motion.is_some()
     }
 
-    /// From where rays begin that pass a world position, to there, for a camera that stands still; of any length.
-    pub(super) fn way_to(&self, position: Vec3) -> Vec3 {
-        if self.parallel { self.forward } else { position - self.position }
-    }
-
-    /// The ray through a place in the picture and the middle of the lens, as the shutter opens.
-    pub(super) fn ray_through(&self, position_px: Vec2) -> Ray {
-        self.ray(&CameraSample { position_px, lens: [0.5; 2], time: 0.0 })
-    }
-
     /// Whether rays begin all over a lens.
     pub(super) fn has_lens(&self) -> bool {
         self.lens_right != Vec3::ZERO
     }
 
-    /// How far to the side and up, in pixels, the rays are spread through which the lens sees a world position: the half axes of its circle
-    /// of confusion. For a camera that stands still.
-    pub(super) fn blur_px(&self, position: Vec3) -> Vec2 {
-        let spread = self.spread(self.depth_of(position)).abs();
-        let along = |lens: Vec3, pixel: Vec3| spread * lens.length() / pixel.length();
-        Vec2::new(along(self.lens_right, self.pixel_right), along(self.lens_up, self.pixel_down))
-    }
-
-    /// Place in the picture, in pixels, at which a point of the lens, by its [`CameraSample::lens`], sees a world position, for a camera that
-    /// stands still; `None` at and behind the lens.
-    pub(super) fn project_through(&self, lens: [f32; 2], position: Vec3) -> Option<Vec2> {
-        let middle = self.project(position)?;
-        let disc = concentric_disc(lens);
-        let on_lens = self.lens_right * disc.x + self.lens_up * disc.y;
-        Some(middle + self.to_pixels(-self.spread(self.depth_of(position)) * on_lens) - self.center)
-    }
-
-    fn depth_of(&self, position: Vec3) -> f32 {
-        (position - self.position).dot(self.forward)
-    }
-
-    /// What the rays through a point at this depth are spread by, on the plane that [`Self::pixel_right`] is on, over their spread on the lens.
-    fn spread(&self, depth: f32) -> f32 {
-        if self.parallel { 1.0 - depth / self.focus_distance } else { 1.0 / depth - 1.0 / self.focus_distance }
+    /// It at a share of the open shutter, in [0, 1].
+    pub(super) fn at(&self, time: f32) -> CameraAt<'_> {
+        CameraAt::new(self, time)
     }
 
     /// Place in the picture, in pixels, of a world position seen from the middle of the lens as the shutter opens; `None` at and behind the lens.
     pub fn project(&self, position: Vec3) -> Option<Vec2> {
-        let position = match &self.motion {
-            None => position,
-            Some(motion) => motion.at(0.0).inverse().transform_point3(position),
-        };
-        let way = position - self.position;
-        if self.parallel { Some(self.to_pixels(way)) } else { self.project_way(way) }
+        self.at(0.0).project(position)
     }
 
     /// Place in the picture, in pixels, of what is infinitely far in a world direction; `None` beside and behind the lens,
     /// and where rays are parallel.
     pub fn project_direction(&self, direction: Vec3) -> Option<Vec2> {
-        let direction = match &self.motion {
-            None => direction,
-            Some(motion) => motion.at(0.0).inverse().transform_vector3(direction),
-        };
-        if self.parallel { None } else { self.project_way(direction) }
-    }
-
-    fn project_way(&self, way: Vec3) -> Option<Vec2> {
-        let depth = way.dot(self.forward);
-        (depth > 1e-6 * way.length()).then(|| self.to_pixels(way / depth))
-    }
-
-    /// Pixels of a vector from the axis on the plane at distance 1, or in the scene where rays are parallel.
-    fn to_pixels(&self, sideways: Vec3) -> Vec2 {
-        let along = |pixel: Vec3| sideways.dot(pixel) / pixel.length_squared();
-        self.center + Vec2::new(along(self.pixel_right), along(self.pixel_down))
+        self.at(0.0).project_direction(direction)
     }
 }
 
@@ -238,7 +190,7 @@ mod tests {
         }
     }
 
-    /// What a ray meets is projected to where the ray came from, at rest and in motion.
+    /// What a ray meets is projected to where the ray came from, at rest and at any moment of a motion.
     #[test]
     fn projection_undoes_rays() {
         let parallel = Camera { projection: Projection::Orthographic { height: 2.0 }, ..camera(0.5) };
@@ -251,11 +203,14 @@ mod tests {
         for of in [camera(0.5), parallel, moving, mirrored] {
             let rays = CameraRays::new(&of, 200, 100);
             for (x, y) in [(100.0, 50.0), (3.5, 8.25), (180.0, 99.0)] {
-                let (origin, direction) = ray(&rays, x, y, [0.5; 2], 0.0);
-                for distance in [0.5, 30.0] {
-                    let place = rays.project(origin + direction * distance).expect("before the lens");
-                    assert!(place.distance(Vec2::new(x, y)) < 2e-3, "{x} {y}: {place}");
+                for time in [0.0, 0.4, 1.0] {
+                    let (origin, direction) = ray(&rays, x, y, [0.5; 2], time);
+                    for distance in [0.5, 30.0] {
+                        let place = rays.at(time).project(origin + direction * distance).expect("before the lens");
+                        assert!(place.distance(Vec2::new(x, y)) < 2e-3, "{x} {y}: {place}");
+                    }
                 }
+                let direction = ray(&rays, x, y, [0.5; 2], 0.0).1;
                 let place = rays.project_direction(direction);
                 assert_eq!(place.is_none(), rays.is_parallel(), "{x} {y}");
                 assert!(place.is_none_or(|place| place.distance(Vec2::new(x, y)) < 2e-3), "{x} {y}: {place:?}");
@@ -271,16 +226,19 @@ mod tests {
         let parallel = Camera { projection: Projection::Orthographic { height: 2.0 }, ..camera(0.5) };
         let window = ScreenWindow { min: Vec2::new(-1.0, -1.0), max: Vec2::new(1.0, 1.0) };
         let oblong = Camera { screen_window: Some(window), ..camera(0.5) };
-        for of in [camera(0.5), parallel, oblong] {
-            let rays = CameraRays::new(&of, 200, 100);
+        let motion = Motion::between(Affine3A::IDENTITY, Affine3A::from_translation(Vec3::new(2.0, 0.5, 1.0)));
+        let moving = Camera { motion: Some(motion), ..camera(0.5) };
+        for of in [camera(0.5), parallel, oblong, moving] {
+            let (rays, time) = (CameraRays::new(&of, 200, 100), 0.7);
+            let at = rays.at(time);
             for lens in [[0.5, 0.5], [0.0, 0.5], [0.5, 1.0], [0.9, 0.2]] {
-                let (origin, direction) = ray(&rays, 120.0, 30.0, lens, 0.0);
+                let (origin, direction) = ray(&rays, 120.0, 30.0, lens, time);
                 for distance in [2.0, 4.0, 30.0] {
                     let position = origin + distance * direction;
-                    let place = rays.project_through(lens, position).expect("before the lens");
+                    let place = at.project_through(lens, position).expect("before the lens");
                     assert!(place.distance(Vec2::new(120.0, 30.0)) < 2e-3, "{lens:?} {distance}: {place}");
-                    let from_middle = place - rays.project(position).expect("before the lens");
-                    let expected = concentric_disc(lens).abs() * rays.blur_px(position);
+                    let from_middle = place - at.project(position).expect("before the lens");
+                    let expected = concentric_disc(lens).abs() * at.blur_px(position);
                     assert!(from_middle.abs().distance(expected) < 4e-3, "{lens:?} {distance}: {from_middle}");
                 }
             }

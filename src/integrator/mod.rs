@@ -30,7 +30,7 @@ use crate::light::Lights;
 use crate::sampler::{Half, PixelFilter, Sequence};
 use crate::scene::{Camera, Scene};
 use around_camera::AroundCamera;
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use media::Media;
 use prune::ThresholdTable;
 use rayon::prelude::*;
@@ -98,6 +98,12 @@ impl TraceSettings {
     /// The part of the picture that is traced, and that the film holds.
     pub fn film_area(&self) -> Crop {
         self.crop.unwrap_or(Crop { x: 0, y: 0, width: self.width, height: self.height })
+    }
+
+    /// A sample's radiance, or as much of it as [`Self::clamp`] allows.
+    pub(crate) fn clamped(&self, radiance: Vec3) -> Vec3 {
+        let kept = self.clamp.map_or(1.0, |clamp| (clamp / radiance.max_element().max(clamp)).min(1.0));
+        radiance * kept
     }
 }
 

@@ -72,10 +72,7 @@ impl PathTracer {
         self.follow_packet(&mut packet.paths);
         for ((path, start), filter_weight) in packet.paths.iter().zip(&packet.starts).zip(&packet.filter_weights) {
             let mut found = path.found();
-            if let Some(clamp) = self.settings.clamp {
-                found.radiance *= (clamp / found.radiance.max_element().max(clamp)).min(1.0);
-            }
-            found.radiance *= filter_weight;
+            found.radiance = filter_weight * self.settings.clamped(found.radiance);
             sums[start.sum].add(&found);
         }
         packet.starts.clear();

@@ -27,6 +27,15 @@ struct DistantLight {
     has_disc: bool,
 }
 
+/// What is seen of a light from afar.
+pub(super) struct Disc {
+    /// Unit vector towards its middle.
+    pub(super) axis: Vec3,
+    /// Of half the angle that it fills.
+    pub(super) tangent: f32,
+    pub(super) radiance: Vec3,
+}
+
 impl DistantLights {
     /// `None` where no light shines from afar.
     pub(super) fn new(lights: &[Light]) -> Option<Self> {
@@ -60,6 +69,15 @@ impl DistantLights {
         };
         let pdf = if *has_disc { self.pdf(direction) } else { chosen };
         LightSample { direction, place: None, radiance, pdf, is_delta: !has_disc }
+    }
+
+    /// The discs of those that have one and fill no half of the sky.
+    pub(super) fn discs(&self) -> impl Iterator<Item = Disc> {
+        self.lights.iter().filter(|light| light.has_disc && light.cone.one_minus_cos < 1.0).map(|light| {
+            let Cone { axis, one_minus_cos } = light.cone;
+            let sine = (one_minus_cos * (2.0 - one_minus_cos)).sqrt();
+            Disc { axis, tangent: sine / (1.0 - one_minus_cos), radiance: light.strength }
+        })
     }
 
     fn seen(&self, direction: Vec3) -> impl Iterator<Item = (usize, &DistantLight)> {

@@ -8,8 +8,8 @@ use fechner::film::Film;
 use fechner::integrator::{BlockWork, Crop, PathTracer, SamplePlan, TraceSettings};
 use fechner::sampler::{Half, PixelFilter};
 use fechner::scene::load::{LoadOptions, load};
-use fechner::scene::{Alpha, ScalarInput, Scene};
-use glam::Vec3;
+use fechner::scene::{Alpha, Light, Motion, ScalarInput, Scene};
+use glam::{Affine3A, Vec3};
 use std::sync::Arc;
 
 const SIDE: u32 = 16;
@@ -27,6 +27,12 @@ const LAMP: fechner::scene::MaterialId = fechner::scene::MaterialId(0);
 /// The share of each pixel that has much of a small lamp.
 fn shares_of(tracer: &PathTracer) -> Option<Vec<f32>> {
     Some(tracer.known_lamps()?.main_shares().collect())
+}
+
+/// The share of each pixel.
+fn all_shares_of(tracer: &PathTracer) -> Option<Vec<f32>> {
+    let lamps = tracer.known_lamps()?;
+    Some((0..(SIDE * SIDE) as usize).map(|pixel| lamps.share(pixel)).collect())
 }
 
 /// Mean of 8192 samples of each pixel.
@@ -62,6 +68,51 @@ fn shares_are_what_samples_find() {
             assert!(held.len() >= pixels && (ratio - 1.0).abs() < 0.12, "{name} by {filter:?}: {held:?}, {ratio}");
         }
     }
+}
+
+/// A sun of a twelfth of a pixel: looked for where samples find it, through a lens too, but not behind a wall, nor where nothing shows what is
+/// behind things.
+#[test]
+fn the_sun_is_looked_for() {
+    let sun = |scene: &mut Scene, aperture_radius: f32| {
+        let (angular_radius, direction) = (0.0035_f32, Vec3::new(0.05, 0.04, 5.0));
+        let irradiance = Vec3::splat(std::f32::consts::PI * angular_radius.sin().powi(2));
+        let direction = direction.normalize();
+        scene.lights.push(Light::Directional { direction, irradiance, angular_radius, is_of_sky: false });
+        scene.camera.aperture_radius = aperture_radius;
+    };
+    let of = |aperture_radius: f32, is_hidden: bool, transparent: bool| {
+        let mut scene = empty_scene();
+        sun(&mut scene, aperture_radius);
+        if is_hidden {
+            let black = add_material(&mut scene, diffuse(0.0), Vec3::ZERO);
+            add_rectangle(&mut scene, Vec3::new(-9.0, -9.0, -9.0), 18.0 * Vec3::X, 18.0 * Vec3::Y, black);
+        }
+        PathTracer::new(Arc::new(scene), TraceSettings { transparent, ..trace_settings(SIDE, SIDE, 1) })
+    };
+    for aperture_radius in [0.0, 0.3] {
+        let tracer = of(aperture_radius, false, false);
+        let (shares, found) = (all_shares_of(&tracer).expect("the sun"), found(&tracer));
+        let ratio = shares.iter().sum::<f32>() / found.iter().sum::<f32>();
+        println!("lens of {aperture_radius}: {ratio}");
+        assert!((ratio - 1.0).abs() < 0.12, "{aperture_radius}: {ratio}");
+        assert!(of(aperture_radius, true, false).known_lamps().is_none(), "behind a wall");
+        assert!(of(aperture_radius, false, true).known_lamps().is_none(), "of a picture that ends at its surfaces");
+    }
+}
+
+/// What is clamped brings no more light than that.
+#[test]
+fn clamped_lamps_are_known_as_they_are_seen() {
+    let brought = |radiance: f32, clamp: Option<f32>| {
+        let mut scene = empty_scene();
+        add_material(&mut scene, diffuse(0.0), Vec3::splat(radiance));
+        add_sphere(&mut scene, Vec3::new(0.05, 0.04, 0.0), 0.012, LAMP);
+        let tracer = PathTracer::new(Arc::new(scene), TraceSettings { clamp, ..trace_settings(SIDE, SIDE, 1) });
+        let lamps = tracer.known_lamps().expect("a small lamp");
+        (0..(SIDE * SIDE) as usize).map(|pixel| lamps.light(pixel)).sum::<f32>()
+    };
+    assert_eq!(brought(200.0, Some(10.0)), brought(10.0, None));
 }
 
 /// Puts a lens before the camera that blurs what is 5 away over so many pixels to each side.
@@ -102,6 +153,48 @@ fn shares_of_blurred_lamps_are_what_samples_find() {
     }
 }
 
+/// A ball that passes by and one with a lens as well, a turning needle, a tile before a camera that pans and one that half of its way hides: they
+/// are looked for where samples find them, and as much.
+#[test]
+fn shares_of_lamps_that_pass_by_are_what_samples_find() {
+    let to = |way: Vec3| Motion::between(Affine3A::IDENTITY, Affine3A::from_translation(way));
+    let way = Vec3::new(1.1, 0.3, 0.0);
+    let ball = |scene: &mut Scene| {
+        add_sphere(scene, Vec3::new(-0.5, -0.2, 0.0), 0.03, LAMP);
+        scene.spheres[0].motion = Some(to(way));
+    };
+    let blurred = |scene: &mut Scene| {
+        blur(scene, 2.0);
+        ball(scene);
+    };
+    let needle = |scene: &mut Scene| {
+        add_rectangle(scene, Vec3::ZERO, 0.02 * Vec3::Y, 0.6 * Vec3::X, LAMP);
+        scene.instances[0].motion =
+            Some(Motion::between(Affine3A::IDENTITY, Affine3A::from_rotation_z(std::f32::consts::FRAC_PI_2)));
+    };
+    let pan = |scene: &mut Scene| {
+        add_rectangle(scene, Vec3::new(0.4, 0.0, 0.0), 0.1 * Vec3::Y, 0.12 * Vec3::X, LAMP);
+        scene.camera.motion = Some(to(way));
+    };
+    let half_hidden = |scene: &mut Scene| {
+        pan(scene);
+        let black = add_material(scene, diffuse(0.0), Vec3::ZERO);
+        add_rectangle(scene, Vec3::new(0.45, -3.0, 2.5), 6.0 * Vec3::Y, 3.0 * Vec3::X, black);
+    };
+    type Adding<'a> = &'a dyn Fn(&mut Scene);
+    let lamps: [(&str, Adding<'_>); 5] =
+        [("ball", &ball), ("blurred", &blurred), ("needle", &needle), ("pan", &pan), ("half", &half_hidden)];
+    for (name, add) in lamps {
+        let tracer = tracer_of(PixelFilter::Gaussian, 1.0, add);
+        let (shares, found) = (all_shares_of(&tracer).expect("a lamp that passes by"), found(&tracer));
+        let total: f32 = found.iter().sum();
+        let ratio = shares.iter().sum::<f32>() / total;
+        let elsewhere = shares.iter().zip(&found).map(|(share, found)| (share - found).abs()).sum::<f32>() / total;
+        println!("{name}: {ratio}, {elsewhere} elsewhere");
+        assert!((ratio - 1.0).abs() < 0.1 && elsewhere < 0.35, "{name}: {ratio}, {elsewhere}");
+    }
+}
+
 /// What a lens blurs over the whole picture and far beyond comes to an end, and what a film is a part of has the shares of the whole.
 #[test]
 fn blurred_lamps_are_looked_for_within_the_film() {
@@ -125,20 +218,23 @@ fn blurred_lamps_are_looked_for_within_the_film() {
     assert!(expected.iter().all(|&share| share > 0.0));
 }
 
-/// Forty balls far out of focus, of which a render asked for 8 saw a few and left out 46 ± 3 % of their light.
+/// Forty balls far out of focus, and before a camera that pans, of which renders asked for 8 saw a few and left out 46 ± 3 and 27 ± 1 % of their
+/// light.
 #[test]
 fn blurred_lamps_are_not_missed() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/scenes/out-of-focus.toml");
-    let scene = Arc::new(load(path.as_ref(), &LoadOptions::default()).expect("loads"));
-    let nits = scene.nits_per_unit;
-    let tracer = PathTracer::new(scene, TraceSettings::new(64, 48, 1));
-    let light = |sampling, visibility, spp| {
-        let settings = loop_settings(nits, sampling, visibility, spp);
-        adaptive::render(&tracer, &settings, &Quiet).expect("renders").film.estimate(nits).luminance_cd_m2.mean()
-    };
-    let (sum, even) = (light(Sampling::Adaptive, Some(8.0), None), light(Sampling::Uniform, None, Some(1024)));
-    println!("{sum} for {even}");
-    assert!((sum / even - 1.0).abs() < 0.1, "{sum} for {even}");
+    for name in ["out-of-focus", "streaks"] {
+        let path = format!("{}/benches/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let scene = Arc::new(load(path.as_ref(), &LoadOptions::default()).expect("loads"));
+        let nits = scene.nits_per_unit;
+        let tracer = PathTracer::new(scene, TraceSettings::new(64, 48, 1));
+        let light = |sampling, visibility, spp| {
+            let settings = loop_settings(nits, sampling, visibility, spp);
+            adaptive::render(&tracer, &settings, &Quiet).expect("renders").film.estimate(nits).luminance_cd_m2.mean()
+        };
+        let (sum, even) = (light(Sampling::Adaptive, Some(8.0), None), light(Sampling::Uniform, None, Some(1024)));
+        println!("{name}: {sum} for {even}");
+        assert!((sum / even - 1.0).abs() < 0.1, "{name}: {sum} for {even}");
+    }
 }
 
 #[test]
