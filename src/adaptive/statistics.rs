@@ -10,7 +10,7 @@ mod pooling;
 use crate::film::{CHANNELS, Film, HalfPixel, Halves, opponent, share_of_mean};
 use crate::sampler::Half;
 use fechner_perception::Plane;
-use pooling::{Pooled, pooled_by_neighbours};
+use pooling::{PixelSurfaces, Pooled, pooled_by_neighbours};
 use rayon::prelude::*;
 
 /// Variance of one sample in one opponent channel, per pixel, in the unit of the scale that was given, and what
@@ -51,7 +51,8 @@ impl SampleStatistics {
             .with_min_len(1024)
             .map(|i| PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i])))
             .collect();
-        let pooled = pooled_by_neighbours(&evidence, film.guides(), width);
+        let surfaces = PixelSurfaces { guides: film.guides(), known_lamps: film.known_lamps.as_ref() };
+        let pooled = pooled_by_neighbours(&evidence, &surfaces, width);
         let channels = pooled.map(|Pooled { variance, factor, factor_with_own }| ChannelStatistics {
             pooled: variance,
             low_discrepancy_factor: factor,
