@@ -169,10 +169,10 @@ impl FilesWritten {
         let background = arguments.job.background();
         let write = |path: &Path| write_picture(path, format, background, rendered, settings, report, part_of);
         let picture = write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error));
-        let maps = arguments.maps.iter().try_for_each(|map| {
+        let maps = all_written(arguments.maps.iter().map(|map| {
             say!("{}", map.write(rendered, settings.limits.visibility_or_threshold())?);
             Ok(())
-        });
+        }));
         let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, report));
         Self { picture, maps, figures }
     }
