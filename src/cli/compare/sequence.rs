@@ -1,7 +1,7 @@
 //! `fechner compare A.####.exr B.####.exr --fps F`: can one moving picture be told from another?
 
 use super::{CompareArguments, Figures, Seen, check_alike, check_map, write_map};
-use crate::cli::channels::{self, both_motions};
+use crate::cli::channels;
 use crate::cli::json::write_json;
 use crate::cli::kept_tone::{as_rendered, first_scene};
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
@@ -348,18 +348,7 @@ impl<'a> Sequences<'a> {
 
 /// Motion in pixels under the names that renderers give it.
 fn read_motion(path: &Path, size: (usize, usize)) -> Result<FrameMotion> {
-    let exr = channels::read_motion(path, size)?;
-    let Some(motions) = both_motions(&exr) else {
-        bail!(
-            "{}: no motion channels; velocity.X/Y (and velocity_previous.X/Y), Vector.X/Y/Z/W, motion.X/Y and forward.u/v are \
-             known, with or without a layer before them",
-            path.display()
-        );
-    };
-    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([channels::motion_plane(path, &exr, x)?, channels::motion_plane(path, &exr, y)?])
-    };
-    Ok(FrameMotion { to_next: planes(motions.to_next)?, to_previous: planes(motions.to_previous)? })
+    channels::motion_planes(path, &channels::read_motion(path, size)?)
 }
 
 #[cfg(test)]
