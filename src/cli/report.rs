@@ -11,7 +11,7 @@ use fechner::adaptive::pursuit::Pursuit;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
-use fechner::output::{self, Attribute};
+use fechner::output::{self, Attribute, attribute};
 use fechner_perception::Plane;
 use fechner_perception::csf;
 use fechner_perception::display::{Display, Viewing};
@@ -238,20 +238,20 @@ impl Report {
         let text = |s: &str| Attribute::Text(s.to_owned());
         let number = |x: f64| Attribute::Float(x as f32);
         let mut attributes = vec![
-            ("fechner.scene", text(&self.scene)),
+            (attribute::SCENE, text(&self.scene)),
             ("fechner.seed", text(&self.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(", "))),
             ("fechner.sampling", text(self.sampling)),
-            ("fechner.model", text(self.model)),
-            ("fechner.csf", text(self.csf)),
+            (attribute::MODEL, text(self.model)),
+            (attribute::CSF, text(self.csf)),
             ("fechner.eye", text(&self.eye)),
-            ("fechner.operator", text(&self.operator)),
+            (attribute::OPERATOR, text(&self.operator)),
             ("fechner.seen", text("display")),
             ("fechner.latitude_stops", Attribute::Float(0.0)),
-            ("fechner.observer.display", text(&self.observer.display)),
-            ("fechner.observer.pixels_per_degree", number(self.observer.pixels_per_degree)),
-            ("fechner.observer.white_cd_m2", number(self.observer.white_cd_m2)),
-            ("fechner.observer.black_cd_m2", number(self.observer.black_cd_m2)),
-            ("fechner.observer.ambient_cd_m2", number(self.observer.ambient_cd_m2)),
+            (attribute::OBSERVER_DISPLAY, text(&self.observer.display)),
+            (attribute::OBSERVER_PIXELS_PER_DEGREE, number(self.observer.pixels_per_degree)),
+            (attribute::OBSERVER_WHITE_CD_M2, number(self.observer.white_cd_m2)),
+            (attribute::OBSERVER_BLACK_CD_M2, number(self.observer.black_cd_m2)),
+            (attribute::OBSERVER_AMBIENT_CD_M2, number(self.observer.ambient_cd_m2)),
             ("fechner.observer.sensitivity", number(self.observer.sensitivity)),
             ("fechner.observer.csf_area_deg2", number(self.observer.csf_area_deg2)),
             ("fechner.plans", Attribute::Integer(self.plans.try_into().unwrap_or(i32::MAX))),
