@@ -300,9 +300,6 @@ fn settings(arguments: &TonemapArguments) -> Result<ToneSettings> {
     })
 }
 
-/// Operators that lose colour whatever is asked for.
-const ALWAYS_WITHOUT_COLOUR: [&str; 3] = ["ferwerda96", "durand-dorsey00", "pattanaik00"];
-
 /// Refuses what changes nothing of an operator.
 fn check_settings(operator: &dyn ToneOperator, settings: &ToneSettings) -> Result<()> {
     let name = operator.name();
@@ -323,7 +320,7 @@ fn check_settings(operator: &dyn ToneOperator, settings: &ToneSettings) -> Resul
     let effects = [
         ("glare", chosen.glare, Effects { glare: true, ..nothing }),
         ("acuity", chosen.acuity, Effects { acuity: true, ..nothing }),
-        ("colour", chosen.colour && !ALWAYS_WITHOUT_COLOUR.contains(&name), Effects { colour: true, ..nothing }),
+        ("colour", chosen.colour && !operator.always_loses_colour(), Effects { colour: true, ..nothing }),
     ];
     if let Some((effect, ..)) = effects.iter().find(|(_, is_chosen, effect)| *is_chosen && !knows(*effect)) {
         bail!("--effects {effect}: {name} does not show it");
