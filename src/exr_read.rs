@@ -29,7 +29,7 @@ pub(crate) use colour::{Replaced, make_finite};
 use wanted::Wanted;
 pub use window::Window;
 
-/// Most memory that the pixels read of a file may take as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
+/// Most memory that the pixels read of a picture may take, those of an EXR file as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
 pub const MEMORY_LIMIT_BYTES: u64 = 1 << 30;
 
 /// Memory that a pixel of the display window takes, as linear RGB.

@@ -20,6 +20,7 @@ use super::{signals, threads};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::DEFAULT_MAX_SAMPLES;
+use fechner::animate::USUAL_FRAMES_PER_SECOND;
 use fechner::film::Film;
 use frames::{Frames, parse_frames};
 use shot::Made;
@@ -46,7 +47,7 @@ pub(super) struct AnimateArguments {
     #[arg(short, long, value_name = "FILE")]
     output: String,
     /// Frames a second.
-    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, default_value_t = 24.0)]
+    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, default_value_t = USUAL_FRAMES_PER_SECOND)]
     fps: f64,
     /// Picture size.
     #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]

@@ -21,7 +21,7 @@ use anyhow::bail;
 use choices::{AllocationChoice, FilterChoice, PruneChoice, SamplingChoice, SequenceChoice, check_crop, parse_crop};
 use clap::Args;
 use fechner::adaptive::glimpse::steady_glimpse;
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, LoopSettings, Sampling};
+use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, LoopSettings, RivalRule, Sampling};
 use fechner::checkpoint::SettingsRecord;
 use fechner::film::Film;
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, Pruning, TraceSettings};
@@ -76,8 +76,10 @@ pub(super) struct JobArguments {
     /// How samples are spread.
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
     sampling: SamplingChoice,
-    /// Threshold at which --sampling relative and variance stop [default: 0.01].
-    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
+    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling", help = format!(
+        "Threshold at which --sampling relative and variance stop [default: {}]",
+        RivalRule::USUAL_THRESHOLD,
+    ))]
     noise_threshold: Option<f64>,
     /// How --sampling adaptive finds counts [default: convex].
     #[arg(long, value_enum, help_heading = "Sampling")]

@@ -13,7 +13,7 @@ use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
 use fechner::output::{self, Attribute, attribute};
 use fechner_perception::Plane;
-use fechner_perception::csf;
+use fechner_perception::csf::{self, FreshNoise};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::model;
 use fechner_perception::psychometric::detection_probability;
@@ -181,7 +181,7 @@ impl Report {
             seeds: seeds.to_vec(),
             sampling: sampling_name(settings.sampling),
             model: settings.model.as_ref().map_or(model::DEFAULT, |model| model.name()),
-            csf: if settings.frames.is_some() { "castle-fresh-noise" } else { csf::DEFAULT },
+            csf: if settings.frames.is_some() { FreshNoise::NAME } else { csf::DEFAULT },
             operator: judgement.tone.describe(),
             nits_per_unit: settings.nits_per_unit,
             observer: ObserverReport::of(&settings.viewing),
@@ -198,7 +198,7 @@ impl Report {
             visibility_p99: quantile(0.99),
             visibility_p999: quantile(0.999),
             visibility_max: quantile(1.0),
-            fraction_visible: predicted.map(|_| visible_share(judgement, target.unwrap_or(1.0))),
+            fraction_visible: predicted.map(|_| visible_share(judgement, settings.limits.visibility_or_threshold())),
             detection_probability_p99: quantile(0.99).map(detection_probability),
             patches_noticed: predicted.map(|predicted| patches_noticed(predicted, &settings.viewing.display)),
             measured_over_predicted: predicted

@@ -14,6 +14,7 @@ use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, display_help, operator_values_or_all};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use fechner::animate::USUAL_FRAMES_PER_SECOND;
 use fechner::output::{self, Format, PartOf, Shown};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
@@ -55,8 +56,9 @@ pub(super) struct TonemapArguments {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     effects: Option<Vec<Effect>>,
 
-    /// Frames a second of a sequence, 0.001 to 1000; numbers that are missing take their time [default: 24].
-    #[arg(long, value_name = "N", value_parser = parse_lapse_rate, allow_negative_numbers = true, help_heading = "Over time")]
+    #[arg(long, value_name = "N", value_parser = parse_lapse_rate, allow_negative_numbers = true, help_heading = "Over time", help = format!(
+        "Frames a second of a sequence, 0.001 to 1000; numbers that are missing take their time [default: {USUAL_FRAMES_PER_SECOND}]",
+    ))]
     fps: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Over time")]
@@ -353,7 +355,7 @@ impl Eye {
             state = Some(read.with_context(|| format!("{}: not an eye's state as tonemap leaves it", path.display()))?);
             is_between_frames = true;
         }
-        Ok(Self { state, is_between_frames, seconds_per_frame: arguments.fps.unwrap_or(24.0).recip(), kinetics })
+        Ok(Self { state, is_between_frames, seconds_per_frame: arguments.fps.unwrap_or(USUAL_FRAMES_PER_SECOND).recip(), kinetics })
     }
 
     /// The state in which the next frame is seen, so many frames after the last. The first one is seen as it appears; between frames

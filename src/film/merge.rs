@@ -2,12 +2,11 @@
 
 use super::{Film, HalfPixel, PixelGuide, kept_m2, opponent};
 use crate::sampler::Half;
+use fechner_perception::PIXELS_A_TASK;
 use rayon::prelude::*;
 
 /// Most samples of a pixel's half that a film may hold: sums of a few films stay far from where counts wrap around.
 const MOST_TAKEN: u32 = 1 << 29;
-/// Pixels that are worth handing to another thread.
-const PIXELS_A_TASK: usize = 1 << 12;
 
 impl Film {
     /// Most samples of a pixel that a film may hold.

@@ -6,8 +6,8 @@
 //!
 //! Call [`check_target`] before a long render: it finds out whether the file can be written at all.
 
-mod beside;
 pub mod attribute;
+mod beside;
 pub mod channel;
 mod exr_file;
 mod exr_header;

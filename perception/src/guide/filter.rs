@@ -9,7 +9,7 @@ use glam::Vec4;
 /// A neighbour this many standard errors away in luminance gets 1/e of the weight.
 const LUMINANCE_SIGMAS: f32 = 3.0;
 /// A neighbour this many times farther off than the surface's slope explains gets 1/e of the weight.
-const DEPTH_SLOPES: f32 = 1.5;
+pub const DEPTH_SLOPES: f32 = 1.5;
 /// Power of the cosine between normals.
 const NORMAL_SHARPNESS: f32 = 24.0;
 
@@ -18,8 +18,8 @@ const TENT: [f32; 3] = [0.25, 0.5, 0.25];
 /// Columns that are filtered at once: a vector register of the baseline.
 const LANES: usize = 4;
 
-/// From here on [`falling`] is 0.
-const GONE: f32 = 8.0;
+/// Difference, where 1 gives 1/e of the weight, from which on a neighbour has none.
+pub const GONE: f32 = 8.0;
 
 /// About exp(−x), 0 from [`GONE`] on, without the cost of an exponential.
 #[inline(always)]

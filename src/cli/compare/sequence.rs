@@ -10,6 +10,7 @@ use crate::cli::targets::check_kept;
 use crate::cli::words::count;
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
+use fechner::animate::spread_over;
 use fechner::output;
 use fechner_perception::Plane;
 use fechner_perception::csf;
@@ -22,9 +23,6 @@ use serde::Serialize;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-
-/// Frames, spread over the sequence, that the tone operator is fitted to.
-const FITTED_FRAMES: usize = 16;
 
 #[derive(Serialize)]
 struct SequenceFigures {
@@ -167,10 +165,9 @@ fn fit(
     nits_per_unit: Option<f64>,
     viewing: &Viewing,
 ) -> Result<Option<Box<dyn FittedTone>>> {
-    let count = numbers.len().min(FITTED_FRAMES);
     let (mut lights, mut size): (Vec<SceneLight>, _) = (Vec::new(), None);
-    for index in 0..count {
-        let path = name.of(numbers[index * numbers.len() / count]);
+    for index in spread_over(numbers.len()) {
+        let path = name.of(numbers[index]);
         let picture = InputPicture::read_frame(&path, nits_per_unit)?;
         let Some(light) = picture.scene_light(operator) else { return Ok(None) };
         if *size.get_or_insert(picture.size()) != picture.size() {
