@@ -1,9 +1,10 @@
 //! `fechner compare A.####.exr B.####.exr --fps F`: can one moving picture be told from another?
 
-use super::{CompareArguments, Figures, Seen, check_alike, check_map, write_map};
+use super::{CompareArguments, Figures, Seen, check_alike, write_map};
 use crate::cli::channels;
 use crate::cli::json::write_json;
 use crate::cli::kept_tone::{as_rendered, first_scene};
+use crate::cli::maps::check_map;
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
 use crate::cli::seeing::tone_operator;
 use crate::cli::targets::check_kept;
@@ -12,7 +13,6 @@ use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::animate::spread_over;
 use fechner::output;
-use fechner_perception::Plane;
 use fechner_perception::csf;
 use fechner_perception::display::Viewing;
 use fechner_perception::sequence::{FrameMotion, SequenceFrame, SequenceObserver};
