@@ -67,8 +67,8 @@ pub struct ExrImage {
     pub is_display_window_left_out: bool,
     /// Width of a pixel over its height; 1 where the file's is none that a pixel can have (0.01 to 100).
     pub pixel_aspect_ratio: f64,
-    /// Primaries and white of R, G and B, where the file says them: as chromaticities, by a `colorInteropID`, or as an ACES container. Channels are as in the file: see
-    /// [`ExrImage::scene_picture`].
+    /// Primaries and white of R, G and B, where the file says them: as chromaticities, by a `colorInteropID`, or as an ACES container. Channels are
+    /// as in the file: see [`ExrImage::scene_picture`].
     pub chromaticities: Option<Primaries>,
 }
 

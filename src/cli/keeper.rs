@@ -95,6 +95,7 @@ impl Keeper {
         history.longest_write = history.longest_write.max(snapshot.elapsed());
         history.writing += snapshot.elapsed();
     }
+
     /// Says what keeping the film took of the `whole` time.
     ///
     /// # Errors
@@ -147,8 +148,7 @@ mod tests {
     fn what_fails_is_kept() {
         let folder = tempfile::tempdir().expect("a folder");
         let film = folder.path().join("film");
-        let arguments =
-            CheckpointArguments { checkpoint: Some(film.clone()), checkpoint_every: EVERY, resume: false };
+        let arguments = CheckpointArguments { checkpoint: Some(film.clone()), checkpoint_every: EVERY, resume: false };
         let keeper = Keeper::new(&arguments, header(), SeedsSoFar::of_one(0));
         let watch = Watch::new(Arc::default(), Console::new(None), Some(keeper), None, None);
         watch.failed(&RenderState::new(1, 1, &Limits::of_visibility(1.0)));

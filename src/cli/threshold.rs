@@ -263,7 +263,8 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
     let halves = [a?, b?];
     if halves[0].codes() == halves[1].codes() {
         bail!(
-            "--halves {} {}: equal in every value, which tells nothing of noise: one picture twice, two renders by one seed, or a scene without noise; give two renders by different seeds",
+            "--halves {} {}: equal in every value, which tells nothing of noise: one picture twice, two renders by one seed, or a \
+             scene without noise; give two renders by different seeds",
             a_path.display(),
             b_path.display()
         );

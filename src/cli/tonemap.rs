@@ -31,8 +31,8 @@ pub(super) struct TonemapArguments {
     #[arg(required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// .png (16-bit PQ for an HDR display, sRGB for all others, which colour management brings to them), .exr with what the
-    /// display emits in units of its white: `absolute` shows that as it is. The name of a sequence has # for each digit of the frame's number: night.####.png. Numbers are those in the inputs' names where all
-    /// have different ones, and else count from 1.
+    /// display emits in units of its white: `absolute` shows that as it is. The name of a sequence has # for each digit of the frame's number:
+    /// night.####.png. Numbers are those in the inputs' names where all have different ones, and else count from 1.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Tone operator, or "all" for a sheet with all of them [default: as the picture was shown when it was rendered, if its file says so].
@@ -355,7 +355,12 @@ impl Eye {
             state = Some(read.with_context(|| format!("{}: not an eye's state as tonemap leaves it", path.display()))?);
             is_between_frames = true;
         }
-        Ok(Self { state, is_between_frames, seconds_per_frame: arguments.fps.unwrap_or(USUAL_FRAMES_PER_SECOND).recip(), kinetics })
+        Ok(Self {
+            state,
+            is_between_frames,
+            seconds_per_frame: arguments.fps.unwrap_or(USUAL_FRAMES_PER_SECOND).recip(),
+            kinetics,
+        })
     }
 
     /// The state in which the next frame is seen, so many frames after the last. The first one is seen as it appears; between frames
@@ -371,5 +376,20 @@ impl Eye {
         self.is_between_frames = true;
         self.state = Some(state);
         state
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_help_names_all_operators_that_always_lose_colour() {
+        let value = Effect::Colour.to_possible_value().expect("a value");
+        let help = value.get_help().expect("help").to_string();
+        for name in tone::operator_names() {
+            let operator = tone::operator(name, None).expect("known");
+            assert_eq!(help.contains(name), operator.always_loses_colour(), "{name}: {help}");
+        }
     }
 }
