@@ -29,7 +29,7 @@ pub(crate) use colour::{Replaced, make_finite};
 use wanted::Wanted;
 pub use window::Window;
 
-/// Most memory that the pixels read of a file may take as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
+/// Most memory that the pixels read of a picture may take, those of an EXR file as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
 pub const MEMORY_LIMIT_BYTES: u64 = 1 << 30;
 
 /// Memory that a pixel of the display window takes, as linear RGB.
@@ -67,8 +67,8 @@ pub struct ExrImage {
     pub is_display_window_left_out: bool,
     /// Width of a pixel over its height; 1 where the file's is none that a pixel can have (0.01 to 100).
     pub pixel_aspect_ratio: f64,
-    /// Primaries and white of R, G and B, where the file says them: as chromaticities, by a `colorInteropID`, or as an ACES container. Channels are as in the file: see
-    /// [`ExrImage::scene_picture`].
+    /// Primaries and white of R, G and B, where the file says them: as chromaticities, by a `colorInteropID`, or as an ACES container. Channels are
+    /// as in the file: see [`ExrImage::scene_picture`].
     pub chromaticities: Option<Primaries>,
 }
 

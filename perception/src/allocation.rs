@@ -98,8 +98,11 @@ pub fn allocate(problem: &AllocationProblem<'_>) -> Result<Allocation, Error> {
     Ok(solver.solve(problem.visibility, &mut multipliers))
 }
 
-/// Largest log visibility that the search goes to, either way.
+/// Largest log visibility that the search goes to, either way: ln 10⁹.
 const FARTHEST: f64 = 20.7;
+
+/// Share of the budget that counts as all of it.
+const LEAST_SPENT: f64 = 0.99;
 
 /// Finds the lowest visibility that `budget` (Σ cᵢ nᵢ) can pay for, and the counts for it; `problem.visibility` is where
 /// the search begins.
@@ -123,7 +126,7 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
         let excess = found.cost / budget;
         if excess <= 1.0 {
             affordable = visibility.ln();
-            let enough = excess > 0.99;
+            let enough = excess > LEAST_SPENT;
             if best.as_ref().is_none_or(|best| best.visibility > visibility) {
                 best = Some(found);
             }
@@ -138,12 +141,13 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
                 break;
             }
         }
-        // Without limits cost goes as v⁻²; aim a little below the budget.
-        let aimed = visibility.ln() + 0.5 * (excess / 0.995).ln();
+        // Without limits cost goes as v⁻²; aim amid what is enough.
+        let aimed = visibility.ln() + 0.5 * (excess / (0.5 * (LEAST_SPENT + 1.0))).ln();
         let next = if too_dear.is_finite() && affordable.is_finite() {
             if affordable - too_dear < 1e-4 {
                 break;
             }
+            // Of every bracket a tenth goes at least.
             let margin = 0.1 * (affordable - too_dear);
             aimed.clamp(too_dear + margin, affordable - margin)
         } else {

@@ -125,7 +125,7 @@ impl ThresholdMap {
         let span = LuminanceSpan::of([&self.adaptation_cd_m2]);
         let tables = SensitivityTables::new(&self.bands, &self.viewing, &csf, span);
         let gain = noise_gain(&tables, &self.adaptation_cd_m2, &[]);
-        let grey_cd_m2 = 0.2 * self.viewing.display.white_cd_m2;
+        let grey_cd_m2 = self.viewing.display.grey_cd_m2();
         Ok(self.seen_from_gaze(gain, channel, |freq_cpd| csf.sensitivity(freq_cpd, grey_cd_m2)))
     }
 

@@ -133,6 +133,12 @@ impl Display {
         PixelDensity { horizontal, vertical: horizontal * self.pixel_aspect_ratio }
     }
 
+    /// Luminance, cd/m², of a mid grey, at which contrast sensitivity is taken where it has to be one for all of the picture.
+    #[must_use]
+    pub fn grey_cd_m2(&self) -> f64 {
+        0.2 * self.white_cd_m2
+    }
+
     /// Luminance, cd/m², that this display shows for linear light `relative` (clamped to 0..1; NaN counts as 0):
     /// black + ambient + (white − black) · relative.
     #[must_use]

@@ -19,7 +19,7 @@ pub struct Plane {
 const LARGEST_LUMINANCE_CD_M2: f32 = 1e30;
 
 /// Pixels that are worth handing to another thread: 16,384 left a second core idle at 128×128.
-pub(crate) const PIXELS_A_TASK: usize = 1 << 12;
+pub const PIXELS_A_TASK: usize = 1 << 12;
 
 impl Plane {
     /// A plane whose every pixel is `value`.

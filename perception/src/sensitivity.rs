@@ -147,7 +147,7 @@ impl SensitivityTables {
                     .collect()
             })
             .collect();
-        let grey_cd_m2 = 0.2 * viewing.display.white_cd_m2;
+        let grey_cd_m2 = viewing.display.grey_cd_m2();
         let tables = (0..count)
             .into_par_iter()
             .map(|band| BandTables {

@@ -35,11 +35,19 @@ pub fn photopic(adaptation_cd_m2: f64) -> f64 {
     let log = log10(adaptation_cd_m2);
     exp10(if log <= -2.6 {
         -0.72
-    } else if log >= 1.9 {
+    } else if log >= CONES_IN_BRIGHT_LIGHT {
         log - 1.255
     } else {
-        (0.249 * log + 0.65).powf(2.7) - 0.72
+        log_of_cones_between(log)
     })
+}
+
+/// log₁₀ of the luminance from which on the threshold of the cones is in proportion to it.
+const CONES_IN_BRIGHT_LIGHT: f64 = 1.9;
+
+/// log₁₀ of the threshold of the cones below that.
+fn log_of_cones_between(log: f64) -> f64 {
+    (0.249 * log + 0.65).powf(2.7) - 0.72
 }
 
 /// Threshold of the rods, cd/m² (Ferwerda et al. 1996).
@@ -48,11 +56,19 @@ pub fn scotopic(adaptation_cd_m2: f64) -> f64 {
     let log = log10(adaptation_cd_m2);
     exp10(if log <= -3.94 {
         -2.86
-    } else if log >= -1.44 {
+    } else if log >= RODS_IN_BRIGHT_LIGHT {
         log - 0.395
     } else {
-        (0.405 * log + 1.6).powf(2.18) - 2.86
+        log_of_rods_between(log)
     })
+}
+
+/// log₁₀ of the luminance from which on the threshold of the rods is in proportion to it.
+const RODS_IN_BRIGHT_LIGHT: f64 = -1.44;
+
+/// log₁₀ of the threshold of the rods below that.
+fn log_of_rods_between(log: f64) -> f64 {
+    (0.405 * log + 1.6).powf(2.18) - 2.86
 }
 
 /// Threshold of the whole eye, cd/m² (Ward Larson, Rushmeier and Piatko 1997): the lower of the two.
@@ -69,19 +85,12 @@ pub fn combined(adaptation_cd_m2: f64) -> f64 {
 #[must_use]
 pub fn combined_monotone(adaptation_cd_m2: f64) -> f64 {
     // The values just below the two steps down, where the curve is at a local maximum.
-    let steps = [-1.44_f64, 1.9].map(|log| (log, exp10(log)));
-    let mut value = combined(adaptation_cd_m2);
-    for (log, step_cd_m2) in steps {
-        if adaptation_cd_m2 >= step_cd_m2 {
-            let before = if log < 0.0 {
-                exp10((0.405 * log + 1.6).powf(2.18) - 2.86)
-            } else {
-                exp10((0.249 * log + 0.65).powf(2.7) - 0.72)
-            };
-            value = value.max(before);
-        }
-    }
-    value
+    let steps = [
+        (RODS_IN_BRIGHT_LIGHT, log_of_rods_between(RODS_IN_BRIGHT_LIGHT)),
+        (CONES_IN_BRIGHT_LIGHT, log_of_cones_between(CONES_IN_BRIGHT_LIGHT)),
+    ];
+    let reached = steps.into_iter().filter(|&(log, _)| adaptation_cd_m2 >= exp10(log));
+    reached.fold(combined(adaptation_cd_m2), |value, (_, before)| value.max(exp10(before)))
 }
 
 /// NaN and everything below the floor of vision count as 1e-6 cd/m².

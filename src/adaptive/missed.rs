@@ -5,7 +5,7 @@
 //! a pixel to the next across an edge is known: it is the pixel filter's own shape. Of a lamp thinner than a pixel nothing tells which way
 //! it goes on: any neighbour may have as much of it.
 
-use crate::film::{Film, HalfPixel, Halves, opponent};
+use crate::film::{Film, HalfPixel, Halves};
 use crate::sampler::{Half, PixelFilter};
 use fechner_perception::Plane;
 use fechner_perception::tone::Pixel;
@@ -72,7 +72,7 @@ impl FoundLight {
         let plane = |value: &(dyn Fn(Halves<'a>) -> f64 + Sync)| {
             Plane::from_fn(width, film.height() as usize, |x, y| (nits_per_unit * value(halves(y * width + x))) as f32)
         };
-        let mean = |halves: Halves<'a>| halves.mean(luminance);
+        let mean = |halves: Halves<'a>| halves.mean(HalfPixel::luminance);
         let lamp = |halves: Halves<'a>| {
             let mean = mean(halves);
             if mean > 0.0 { halves.mean(mean_square_luminance) / mean } else { 0.0 }
@@ -81,12 +81,8 @@ impl FoundLight {
     }
 }
 
-fn luminance(half: &HalfPixel) -> f64 {
-    opponent(half.mean)[0]
-}
-
 fn mean_square_luminance(half: &HalfPixel) -> f64 {
-    luminance(half).powi(2) + f64::from(half.m2[0]) / f64::from(half.samples.max(1))
+    half.luminance().powi(2) + f64::from(half.m2[0]) / f64::from(half.samples.max(1))
 }
 
 /// Where lamps' edges are looked for.
@@ -102,20 +98,16 @@ pub(super) struct LampEdges<'a> {
 impl LampEdges<'_> {
     /// Luminance of lamps, cd/m², that is expected in each pixel beyond what its samples have found.
     pub(super) fn missed(&self) -> Plane {
-        self.missed_where(|pixel| {
-            let is_met = self.film.guides()[pixel].seen.shines();
-            (!is_met).then(|| (self.found.mean_cd_m2.values()[pixel], self.film.samples(pixel) as f32))
-        })
+        self.missed_where(|pixel| !self.film.guides()[pixel].seen.shines())
     }
 
     /// The same, whether samples have met it or not: counts that went by that would end where a rim was lucky, and make rims bright by 0.2 %
     /// of the whole picture's light.
     pub(super) fn expected(&self) -> Plane {
-        self.missed_where(|pixel| Some((self.found.mean_cd_m2.values()[pixel], self.film.samples(pixel) as f32)))
+        self.missed_where(|_| true)
     }
 
-    /// `unmet`: luminance, cd/m², and samples of a pixel that may have missed light.
-    fn missed_where(&self, unmet: impl Fn(usize) -> Option<(f32, f32)>) -> Plane {
+    fn missed_where(&self, may_have_missed: impl Fn(usize) -> bool) -> Plane {
         let FoundLight { mean_cd_m2, lamp_cd_m2 } = self.found;
         let (width, height) = (mean_cd_m2.width(), mean_cd_m2.height());
         let around = |(x, y): (usize, usize), radius: usize| {
@@ -138,7 +130,10 @@ impl LampEdges<'_> {
             let is_thin = lamps().all(|at| light(at) < 0.5 * lamp_cd_m2.get(at.0, at.1));
             for (x, y) in around(lamp, 1) {
                 let pixel = y * width + x;
-                let Some((own, samples)) = unmet(pixel) else { continue };
+                if !may_have_missed(pixel) {
+                    continue;
+                }
+                let (own, samples) = (light((x, y)), self.film.samples(pixel) as f32);
                 let coverage = light(lamp) / full;
                 let step_px = ((x.abs_diff(lamp.0) + y.abs_diff(lamp.1)) as f32).sqrt();
                 let coverage = if is_thin { coverage } else { self.profile.farther_out(coverage, step_px) };

@@ -16,8 +16,8 @@ use crate::film::Film;
 use crate::integrator::{BlockWork, PILOT_SAMPLES_A_HALF, PILOT_SAMPLES_A_PIXEL, SamplePlan};
 use crate::sampler::Half;
 use blocks::doubled_blocks;
-use fechner_perception::Plane;
 use fechner_perception::allocation::{AllocationProblem, allocate};
+use fechner_perception::{PIXELS_A_TASK, Plane};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -34,9 +34,6 @@ const MOST_DOUBLINGS_OF_EXCESS: u32 = 4;
 
 /// One part in so many of the film's samples may go at once to pixels that are doubled on suspicion.
 const SMALL_DOUBLING: u64 = 32;
-
-/// Pixels that are worth handing to another thread.
-const PIXELS_A_TASK: usize = 1 << 12;
 
 /// Gap to the cheapest counts that is enough: rounding to doublings and the confidence margin cost more than 1 %.
 const ENOUGH_GAP: f64 = 0.01;

@@ -14,8 +14,14 @@ use crate::sampler::{Half, hash_words, unit_f64_of_hash};
 const STEP: u32 = 16;
 /// Cycles multiplies its threshold by this.
 const RELATIVE_SCALE: f64 = 5.0;
+/// Cycles adds this to what it divides by (`film_adaptive_sampling_convergence_check`).
+const RELATIVE_EPSILON: f64 = 1e-4;
+/// Least mean to divide by, as a share of display white.
+const LEAST_MEAN: f64 = 1e-3;
 /// Side of the square of pixels whose samples Tungsten pools.
 const RECORD_SIDE: usize = 4;
+/// Quantile of records' errors at which Tungsten clamps them (`errorPercentile95`).
+const CLAMPED_AT: f64 = 0.95;
 /// Tungsten's least squared mean to divide by.
 const LEAST_SQUARED_MEAN: f64 = 1e-3;
 
@@ -76,7 +82,7 @@ fn relative_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
         let error: f64 = a[i].mean.iter().zip(b[i].mean).map(|(a, b)| 0.5 * (a - b).abs() * exposure).sum();
         let sum: f64 = a[i].mean.iter().zip(b[i].mean).map(|(a, b)| 0.5 * (a + b) * exposure).sum();
         let norm = if sum < 1.0 { sum.max(0.0).sqrt() } else { sum };
-        f64::from(film.samples(i)) < least || error > threshold * RELATIVE_SCALE * (1e-4 + norm)
+        f64::from(film.samples(i)) < least || error > threshold * RELATIVE_SCALE * (RELATIVE_EPSILON + norm)
     };
     dilated(&(0..a.len()).map(fails).collect::<Vec<_>>(), film.width() as usize)
 }
@@ -96,13 +102,13 @@ fn variance_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
     let is_active = |pixel: usize| {
         let halves = film.halves(pixel);
         let mean = halves.mean(HalfPixel::luminance);
-        halves.variance_of_mean(0).sqrt() > threshold * mean.max(1e-3 / exposure)
+        halves.variance_of_mean(0).sqrt() > threshold * mean.max(LEAST_MEAN / exposure)
     };
     (0..film.pixel_count()).map(is_active).collect()
 }
 
 /// One pass of Tungsten's: as many samples as 16 a pixel, one everywhere and the others in proportion to each record's
-/// error, which is clamped at its 95th percentile and dilated; fractions are rounded by chance.
+/// error, which is clamped at [`CLAMPED_AT`] and dilated; fractions are rounded by chance.
 fn budget_pass(film: &Film, exposure: f64, left: u64, max_samples: u32) -> SamplePlan {
     let pixels = film.pixel_count();
     let pass = left.min(u64::from(STEP) * pixels as u64);
@@ -136,7 +142,7 @@ fn record_errors(film: &Film, exposure: f64) -> Vec<f64> {
         .collect();
     let mut sorted = records.clone();
     sorted.sort_by(f64::total_cmp);
-    let clamp = sorted[(0.95 * (sorted.len() - 1) as f64) as usize];
+    let clamp = sorted[(CLAMPED_AT * (sorted.len() - 1) as f64) as usize];
     let dilated = |r: usize| {
         let (x, y) = (r % columns, r / columns);
         (y.saturating_sub(1)..(y + 2).min(rows))

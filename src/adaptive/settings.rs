@@ -29,7 +29,7 @@ pub enum Sampling {
 pub enum RivalRule {
     /// Difference of two estimates over the square root of brightness, dilated, as Cycles does it.
     Relative {
-        /// Its noise threshold; 0.01 is its default.
+        /// Its noise threshold; [`RivalRule::USUAL_THRESHOLD`] is its default.
         threshold: f64,
     },
     /// Standard error of the pixel over its mean.
@@ -39,6 +39,11 @@ pub enum RivalRule {
     },
     /// A budget spread by relative variance of 4×4 pixels, as Tungsten does it; it has no stop of its own.
     Budget,
+}
+
+impl RivalRule {
+    /// Threshold where none is asked for, Cycles' own.
+    pub const USUAL_THRESHOLD: f64 = 0.01;
 }
 
 /// How the adaptive mode finds a pixel's count.

@@ -9,7 +9,7 @@ mod pooling;
 
 use crate::film::{CHANNELS, Film, HalfPixel, Halves, opponent, share_of_mean};
 use crate::sampler::Half;
-use fechner_perception::Plane;
+use fechner_perception::{PIXELS_A_TASK, Plane};
 use pooling::{PixelSurfaces, Pooled, pooled_by_neighbours};
 use rayon::prelude::*;
 
@@ -48,7 +48,7 @@ impl SampleStatistics {
         let (a, b) = (film.half(Half::A), film.half(Half::B));
         let evidence: Vec<[PixelEvidence; CHANNELS]> = (0..a.len())
             .into_par_iter()
-            .with_min_len(1024)
+            .with_min_len(PIXELS_A_TASK)
             .map(|i| PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i])))
             .collect();
         let surfaces = PixelSurfaces { guides: film.guides(), known_lamps: film.known_lamps.as_ref() };

@@ -38,6 +38,18 @@ use std::sync::Arc;
 use track::TrackFrame;
 use velocity::{VelocityMap, VelocityOf};
 
+/// Frames a second where nobody says how many: the cinema's.
+pub const USUAL_FRAMES_PER_SECOND: f64 = 24.0;
+
+/// Frames, spread over a shot, that one fit for all looks at: a look takes up to 2^20 samples.
+const FITTED_FRAMES: usize = 16;
+
+/// Places, among so many frames, of those that one fit for all looks at.
+pub fn spread_over(frames: usize) -> impl Iterator<Item = usize> {
+    let count = frames.min(FITTED_FRAMES);
+    (0..count).map(move |place| place * frames / count)
+}
+
 /// Where the scenes of a shot come from.
 pub trait SceneSource {
     /// The scene as it is at a time in seconds.

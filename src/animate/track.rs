@@ -5,7 +5,7 @@
 //! and noise change, and look at no more of them.
 
 use super::budget::Needs;
-use super::{SceneSource, ShotSettings};
+use super::{SceneSource, ShotSettings, spread_over};
 use crate::adaptive::glimpse::{coarse_glimpse_for, steady_glimpse_for};
 use crate::checkpoint::PROGRAM;
 use crate::denoise::Denoiser;
@@ -17,8 +17,6 @@ use fechner_perception::tone::{AdaptationState, Goal, SavedTone, SceneLight, Ton
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Frames, spread over the shot, that one fit for all looks at: a look takes up to 2^20 samples.
-const FITTED_FRAMES: usize = 16;
 /// Change of what an eye adapts to, by a doubling of the last samples, from which on noise takes more of it than few pixels would add: on our
 /// other scenes it is below 0.025, and a coarse glimpse adapts eyes to 1 to 5 % more light, 18 % on `scenes/many-lights.toml`.
 const UNSETTLED: f32 = 0.05;
@@ -192,8 +190,7 @@ fn eyes(shot: &ShotSettings, operator: &dyn ToneOperator, goals: &[Goal]) -> Vec
 
 /// Whether one fit for all looks at a frame, by its place among all.
 fn is_fitted_to(index: usize, frames: usize) -> bool {
-    let count = frames.min(FITTED_FRAMES);
-    (0..count).any(|place| place * frames / count == index)
+    spread_over(frames).any(|place| place == index)
 }
 
 /// A small, denoised picture of a frame.
@@ -331,6 +328,6 @@ mod tests {
         let fitted = |frames| (0..frames).filter(|&index| is_fitted_to(index, frames)).collect::<Vec<_>>();
         assert_eq!(fitted(3), [0, 1, 2]);
         assert_eq!(fitted(32), (0..16).map(|place| 2 * place).collect::<Vec<_>>());
-        assert_eq!(fitted(17).len(), FITTED_FRAMES);
+        assert_eq!(fitted(17).len(), 16);
     }
 }

@@ -16,14 +16,13 @@ use crate::adaptive::{Quiet, render};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use anyhow::Result;
 use fechner_perception::Plane;
+use fechner_perception::denoised::VISIBLY_WRONG;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// Side of a tile, pixels.
 const TILE: usize = 16;
-/// A tile is visibly wrong above this many times the visibility that it is called fine for.
-const VISIBLY_WRONG: f64 = 1.5;
 /// Budgets, mean samples a pixel.
 const BUDGETS: [u32; 7] = [4, 8, 16, 32, 64, 128, 256];
 /// Budgets whose pictures the law is held against.
@@ -165,7 +164,7 @@ impl SceneBench<'_> {
         let true_energy = self.truth.squared_visibility(&self.truth.displayed(&picture.rgb_cd_m2));
         let predicted = found.predicted.map(|v| v * v);
         let unproven = tiles(&picture.error.unproven(self.settings.target));
-        let (wrong, fine) = (VISIBLY_WRONG * self.settings.target, self.settings.target);
+        let (wrong, fine) = (f64::from(VISIBLY_WRONG) * self.settings.target, self.settings.target);
         let truths: Vec<f64> = tiles(&true_energy).into_iter().map(f64::sqrt).collect();
         let predictions: Vec<f64> = tiles(&predicted).into_iter().map(f64::sqrt).collect();
         let share =

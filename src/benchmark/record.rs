@@ -14,6 +14,9 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Pixels count as clearly above the target from this many times v\* on.
+pub(super) const CLEARLY_ABOVE: f64 = 1.25;
+
 /// One arm of one scene with one seed (or all of them pooled) at one coverage. `samples` and `seconds` are what the arm
 /// needs to bring this share of the picture to v\*: those of the render, scaled by v² ∝ 1/n.
 #[derive(Clone, Debug, Serialize)]
@@ -43,7 +46,7 @@ pub struct Record {
     pub energy_bias: Option<f64>,
     /// Half width of its 95 % interval.
     pub energy_bias_ci: Option<f64>,
-    /// Share of pixels that ended with true v above 1.25 v\*.
+    /// Share of pixels that ended with true v above `CLEARLY_ABOVE` v\*.
     pub overshoot_fraction: f64,
     /// Share of the time that is not tracing.
     pub overhead: f64,
@@ -175,7 +178,7 @@ impl Results {
         ) else {
             return;
         };
-        let above = energy.values().iter().filter(|&&v| f64::from(v) > 1.5625 * target).count();
+        let above = energy.values().iter().filter(|&&v| f64::from(v) > CLEARLY_ABOVE * CLEARLY_ABOVE * target).count();
         let bias = pooled_bias(runs);
         self.records.extend(COVERAGES.map(|coverage| Record {
             scene: scene.to_owned(),

@@ -5,7 +5,7 @@ use super::curve::Curve;
 use super::pictures::{ShownPicture, heat_codes};
 use super::plot::plots;
 use super::quote::html_text;
-use super::record::{ArmSummary, Record, Results, ScenePictures};
+use super::record::{ArmSummary, CLEARLY_ABOVE, Record, Results, ScenePictures};
 use super::summary::intervals_in_words;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -118,9 +118,9 @@ fn bars(records: &[&Record]) -> String {
 }
 
 fn scene_table(records: &[&Record]) -> String {
-    let mut text = String::from(
+    let mut text = format!(
         "<div class=\"wide\"><table>\n<tr><th>arm</th><th>spp at 99&nbsp;%</th><th>uniform /&nbsp;arm</th><th>oracle /&nbsp;arm</th>\
-         <th>rendered at v&nbsp;/&nbsp;v*</th><th>above 1.25&nbsp;v*</th><th>FLIP</th><th>JOD</th><th>relMSE</th><th>energy bias</th>\
+         <th>rendered at v&nbsp;/&nbsp;v*</th><th>above {CLEARLY_ABOVE}&nbsp;v*</th><th>FLIP</th><th>JOD</th><th>relMSE</th><th>energy bias</th>\
          <th>not tracing</th></tr>\n",
     );
     let ratio = |value: Option<f64>| if_known(value, |value| format!("{value:.2}"));

@@ -19,8 +19,8 @@ const AVERAGE_NODES: usize = 4 * (ROUGHNESS_NODES - 1) + 1;
 #[derive(Clone)]
 pub(crate) struct AlbedoTable {
     rows: [[f32; COSINE_NODES]; ROUGHNESS_NODES],
-    /// 2∫ of the curve at each of more closely spaced roughnesses times μ dμ, over roughness⁴ = α². The average falls like α² towards smooth surfaces, where linear
-    /// interpolation of the average itself would be wrong by a tenth; of the ratio it is not.
+    /// 2∫ of the curve at each of more closely spaced roughnesses times μ dμ, over roughness⁴ = α². The average falls like α² towards smooth
+    /// surfaces, where linear interpolation of the average itself would be wrong by a tenth; of the ratio it is not.
     averages_over_alpha2: [f32; AVERAGE_NODES],
 }
 

@@ -27,6 +27,9 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 /// The wavelengths that stand for the channels, in nanometres.
 const WAVELENGTHS_NM: [f32; 3] = [610.0, 550.0, 465.0];
 
+/// Height of relief below which a face is a mirror: g is below 1e-9, and e^−g is 1 to `f32`.
+const FLATTEST_NM: f32 = 1e-3;
+
 /// A Gaussian relief of the size of a wavelength.
 #[derive(Clone, Copy, Debug)]
 pub struct HeTorrance {
@@ -67,7 +70,7 @@ impl HeTorrance {
     }
 
     fn is_mirror(&self) -> bool {
-        self.height_nm < 1e-3
+        self.height_nm < FLATTEST_NM
     }
 
     pub(super) fn has_smooth_lobe(&self) -> bool {
@@ -77,7 +80,7 @@ impl HeTorrance {
     /// τ cot θ/(2σ₀), by which shadowing depends on direction.
     fn shadow_argument(&self, cos: f32) -> f32 {
         let sin = (1.0 - cos * cos).max(1e-12).sqrt();
-        self.correlation_nm * cos / (2.0 * self.height_nm.max(1e-3) * sin)
+        self.correlation_nm * cos / (2.0 * self.height_nm.max(FLATTEST_NM) * sin)
     }
 
     /// Share of the relief that is seen from a cosine (eqs. 23 to 25).
@@ -136,6 +139,7 @@ impl HeTorrance {
         if self.is_mirror() {
             return cosine_only(mirror, diffuse);
         }
+        // Of sampling alone: these change noise, not light. Some is left to every lobe that may give any.
         let scattered = (fresnel.max_element() - mirror).max(0.02);
         let phase2 = self.phase2(wo.z, wo.z).y;
         let coarse = phase2 / (1.0 + phase2);

@@ -92,6 +92,9 @@ struct Sheen {
     passes: f32,
 }
 
+/// The base is sampled with at least this share of what passes the coat: the weight of what it gives stays bounded.
+const LEAST_OF_BASE: f32 = 0.05;
+
 /// Exponents beyond 1/this would crowd at grazing angles only.
 const SMALLEST_ALPHA: f32 = 0.01;
 
@@ -264,7 +267,7 @@ impl<'a> Varnish<'a> {
         let sheen =
             self.sheen.as_ref().map_or(0.0, |sheen| passed * sheen.color.max_element() * sheen.albedo(wo.by_base));
         let left = passed - sheen;
-        let base = (left * self.base.albedo(wo.by_base).max_element()).max(0.05 * left);
+        let base = (left * self.base.albedo(wo.by_base).max_element()).max(LEAST_OF_BASE * left);
         let total = 1.0 - passed + sheen + base;
         [(1.0 - passed) / total, sheen / total]
     }

@@ -36,8 +36,9 @@ pub enum MergeError {
 
 /// Adds the films of several files: half A to half A and B to B, in the order of their seeds, so that the order of
 /// `paths` does not matter. Of a render whose halves are uneven, as with 1 sample a pixel, an odd seed's are added the other way round, so that the
-/// sum of many is even: eight films of one sample had 8 samples in half A, none in B, and told nothing of their noise. What was decided for the single films (plans, rungs, audits) is left behind; the largest
-/// inflation stays. Sums of sums hold the same samples, and may differ in the last bits of variances and first surfaces.
+/// sum of many is even: eight films of one sample had 8 samples in half A, none in B, and told nothing of their noise. What was decided for the
+/// single films (plans, rungs, audits) is left behind; the largest inflation stays. Sums of sums hold the same samples, and may differ in the last
+/// bits of variances and first surfaces.
 ///
 /// Beside the sum, as many films are in memory as there are threads, at most 8.
 ///

@@ -20,6 +20,8 @@ use super::{signals, threads};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::DEFAULT_MAX_SAMPLES;
+use fechner::animate::USUAL_FRAMES_PER_SECOND;
+use fechner::film::Film;
 use frames::{Frames, parse_frames};
 use shot::Made;
 use std::path::{Path, PathBuf};
@@ -45,7 +47,7 @@ pub(super) struct AnimateArguments {
     #[arg(short, long, value_name = "FILE")]
     output: String,
     /// Frames a second.
-    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, default_value_t = 24.0)]
+    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, default_value_t = USUAL_FRAMES_PER_SECOND)]
     fps: f64,
     /// Picture size.
     #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
@@ -62,14 +64,14 @@ pub(super) struct AnimateArguments {
     quality: Option<Quality>,
     /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most; for uniform
     /// sampling as many in each.
-    #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=Film::MOST_SAMPLES_A_PIXEL), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
     /// A budget of this many seconds for all frames that are rendered, spent on those that need it most; for uniform sampling as
     /// many on each.
     #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true, conflicts_with = "spp", help_heading = "Until")]
     time: Option<Duration>,
     /// Most samples of one pixel, at least 16.
-    #[arg(long, value_name = "N", value_parser = whole(16..=u32::MAX), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(16..=Film::MOST_SAMPLES_A_PIXEL), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
     max_spp: u32,
     /// How samples are spread.
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]

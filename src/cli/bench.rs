@@ -74,6 +74,22 @@ enum Suite {
     Animation,
 }
 
+impl Suite {
+    /// Whether it compares arms.
+    fn has_arms(self) -> bool {
+        matches!(self, Self::Quick | Self::Full)
+    }
+
+    /// Whether it judges denoised stills.
+    fn denoises(self) -> bool {
+        matches!(self, Self::Denoise)
+    }
+
+    fn is_animation(self) -> bool {
+        matches!(self, Self::Animation)
+    }
+}
+
 /// Stills of the suite, in `scenes/`.
 const STILLS: [&str; 10] = [
     "complementary-lamps",
@@ -93,20 +109,36 @@ const SHOTS: [&str; 5] = ["light-switch", "opening-door", "rolling-ball", "textu
 /// Runs and prints the table.
 pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     check_suite(arguments)?;
-    let (size, visibility, seeds, arms) = match arguments.suite {
-        Suite::Quick => (128, 4.0, 3, Arm::QUICK.to_vec()),
-        Suite::Full => (256, 1.0, 5, Arm::ALL.to_vec()),
-        Suite::Animation => return run_animations(arguments),
-        Suite::Denoise => return run_denoise(arguments),
-    };
+    match arguments.suite {
+        Suite::Quick => run_arms(arguments, &SuiteDefaults::QUICK),
+        Suite::Full => run_arms(arguments, &SuiteDefaults::FULL),
+        Suite::Denoise => run_denoise(arguments),
+        Suite::Animation => run_animations(arguments),
+    }
+}
+
+/// What a suite of arms does where nothing else is asked for.
+struct SuiteDefaults {
+    size: u32,
+    visibility: f64,
+    seeds: u32,
+    arms: &'static [Arm],
+}
+
+impl SuiteDefaults {
+    const QUICK: Self = Self { size: 128, visibility: 4.0, seeds: 3, arms: &Arm::QUICK };
+    const FULL: Self = Self { size: 256, visibility: 1.0, seeds: 5, arms: &Arm::ALL };
+}
+
+fn run_arms(arguments: &BenchArguments, defaults: &SuiteDefaults) -> Result<()> {
     let scenes = scenes_or(&STILLS, arguments)?;
-    let size = arguments.size.unwrap_or(size);
+    let size = arguments.size.unwrap_or(defaults.size);
     let settings = BenchSettings {
         scenes,
         size: (size, size),
-        visibility: arguments.visibility.unwrap_or(visibility),
-        arms: if arguments.arms.is_empty() { arms } else { named_arms(&arguments.arms) },
-        seeds: arguments.seeds.unwrap_or(seeds),
+        visibility: arguments.visibility.unwrap_or(defaults.visibility),
+        arms: if arguments.arms.is_empty() { defaults.arms.to_vec() } else { named_arms(&arguments.arms) },
+        seeds: arguments.seeds.unwrap_or(defaults.seeds),
         reference_factor: arguments.reference_factor,
         display: arguments.display.clone(),
         output: arguments.output.clone(),
@@ -124,18 +156,14 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
 
 /// Refuses options that the suite would not look at.
 fn check_suite(arguments: &BenchArguments) -> Result<()> {
-    let (is_of_arms, is_denoise, is_animation) = match arguments.suite {
-        Suite::Quick | Suite::Full => (true, false, false),
-        Suite::Denoise => (false, true, false),
-        Suite::Animation => (false, false, true),
-    };
+    let suite = arguments.suite;
     for (option, is_given, is_used, suites) in [
-        ("--denoise", !arguments.denoise.is_empty(), is_denoise || is_animation, "denoise and animation"),
-        ("--law-only", arguments.law_only, is_denoise, "denoise"),
-        ("--fps", arguments.fps.is_some(), is_animation, "animation"),
-        ("--seeds", arguments.seeds.is_some(), is_of_arms || is_denoise, "quick, full and denoise"),
-        ("--bound", arguments.bound, is_of_arms, "quick and full"),
-        ("--arms", !arguments.arms.is_empty(), is_of_arms, "quick and full"),
+        ("--denoise", !arguments.denoise.is_empty(), suite.denoises() || suite.is_animation(), "denoise and animation"),
+        ("--law-only", arguments.law_only, suite.denoises(), "denoise"),
+        ("--fps", arguments.fps.is_some(), suite.is_animation(), "animation"),
+        ("--seeds", arguments.seeds.is_some(), suite.has_arms() || suite.denoises(), "quick, full and denoise"),
+        ("--bound", arguments.bound, suite.has_arms(), "quick and full"),
+        ("--arms", !arguments.arms.is_empty(), suite.has_arms(), "quick and full"),
     ] {
         if is_given && !is_used {
             bail!("{option} is for --suite {suites}: this suite does not look at it");
@@ -146,7 +174,7 @@ fn check_suite(arguments: &BenchArguments) -> Result<()> {
             bail!("{option} is not for --bound, which renders nothing but references: leave one of them out");
         }
     }
-    if is_denoise && arguments.denoise.iter().any(|choice| choice.kind().is_none()) {
+    if suite.denoises() && arguments.denoise.iter().any(|choice| choice.kind().is_none()) {
         bail!("--denoise none: the suite denoise judges denoised pictures; name builtin or oidn");
     }
     Ok(())

@@ -5,6 +5,7 @@ use anyhow::{Result, bail};
 use fechner::exr_read::layers::{PictureLayer, colour_layer, is_called, layers_with, luminance_layer, picture_layer};
 use fechner::exr_read::{ExrImage, layer_and_part, read_exr_channels};
 use fechner_perception::Plane;
+use fechner_perception::sequence::FrameMotion;
 use std::path::Path;
 
 /// Colour as it was found.
@@ -26,8 +27,25 @@ pub(super) fn read_motion(path: &Path, (width, height): (usize, usize)) -> Resul
     Ok(exr)
 }
 
+/// Motion in pixels over the display window, under the names that renderers give it.
+pub(super) fn motion_planes(path: &Path, exr: &ExrImage) -> Result<FrameMotion> {
+    let Some(BothMotions { to_next, to_previous }) = both_motions(exr) else {
+        bail!(
+            "{}: no motion channels; {} of {} are known, and of {} to the frame before, with or without a layer before them",
+            path.display(),
+            VECTOR_PARTS.map(|parts| parts.join("/")).join(", "),
+            MOTION_LAYERS.join(", "),
+            BACKWARD_LAYERS.join(" and ")
+        );
+    };
+    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
+        Ok([motion_plane(path, exr, x)?, motion_plane(path, exr, y)?])
+    };
+    Ok(FrameMotion { to_next: planes(to_next)?, to_previous: planes(to_previous)? })
+}
+
 /// One component of motion over the display window. What is not finite, which a note says, and what has no pixels, rests.
-pub(super) fn motion_plane(path: &Path, exr: &ExrImage, values: Vec<f32>) -> Result<Plane> {
+fn motion_plane(path: &Path, exr: &ExrImage, values: Vec<f32>) -> Result<Plane> {
     if values.iter().any(|value| !value.is_finite()) {
         note(path, "motion that is not finite was replaced: it rests there");
     }
@@ -117,16 +135,16 @@ pub(super) fn motion(exr: &ExrImage) -> Option<(&str, [&[f32]; 2])> {
 
 /// Motion of what a frame shows in both directions of time, pixels, x to the right and y down.
 #[derive(Debug, PartialEq)]
-pub(super) struct BothMotions {
-    pub(super) to_next: [Vec<f32>; 2],
-    pub(super) to_previous: [Vec<f32>; 2],
+struct BothMotions {
+    to_next: [Vec<f32>; 2],
+    to_previous: [Vec<f32>; 2],
 }
 
 /// What layers of motion to the previous frame are called.
 const BACKWARD_LAYERS: [&str; 2] = ["velocity_previous", "backward"];
 
 /// Both motions: ours, Blender's `Vector` of four, or any that [`motion`] finds, which is taken to have been the same before.
-pub(super) fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
+fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
     let negated = |values: &[f32]| values.iter().map(|value| -value).collect::<Vec<f32>>();
     let names = exr.names();
     let of_four = layers_with(&names, &["X", "Y", "Z", "W"]).into_iter().find(|layer| is_called(layer, "vector"));

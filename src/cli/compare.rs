@@ -5,13 +5,14 @@ mod sequence;
 use super::animate::parse_rate;
 use super::json::write_json;
 use super::kept_tone::shown_by;
+use super::maps::check_map;
 use super::picture::{Ground, InputPicture, Shape, Source};
 use super::seeing::{SeeingArguments, operator_values};
 use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::adaptive::settings::THRESHOLD;
-use fechner::output::{self, Format, false_colour};
+use fechner::output::{self, false_colour};
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
 use fechner_perception::tone::FittedTone;
@@ -200,14 +201,6 @@ fn tell(figures: &Figures) {
         figures.display,
         figures.pixels_per_degree
     );
-}
-
-/// Maps are pictures to look at.
-fn check_map(path: &Path) -> Result<()> {
-    if output::check_target(path)? != Format::Png {
-        bail!("{}: --map writes a picture to look at; end the name in .png", path.display());
-    }
-    Ok(())
 }
 
 /// Only pictures of one size and shape can be compared.

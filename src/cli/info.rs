@@ -163,8 +163,9 @@ fn exr_in_words(image: &ExrImage, rows: &[ChannelRow]) -> String {
 
 /// Refuses what a small file can ask for.
 fn check_bytes(path: &Path, (width, height): (u32, u32), bytes: u64) -> anyhow::Result<()> {
-    if bytes > 1 << 30 {
-        bail!("cannot read {}: {width}×{height} pixels need more than 1 GiB", path.display());
+    if bytes > MEMORY_LIMIT_BYTES {
+        let limit = MEMORY_LIMIT_BYTES >> 30;
+        bail!("cannot read {}: {width}×{height} pixels need more than {limit} GiB", path.display());
     }
     Ok(())
 }
@@ -250,7 +251,7 @@ fn describe_hdr(path: &Path) -> anyhow::Result<String> {
             _ => anyhow::Error::new(error).context(problem()),
         })?;
     let mut limits = image::Limits::default();
-    limits.max_alloc = Some(1 << 30);
+    limits.max_alloc = Some(MEMORY_LIMIT_BYTES);
     decoder.set_limits(limits).with_context(problem)?;
     let meta = decoder.metadata();
     let (width, height) = decoder.dimensions();

@@ -21,8 +21,9 @@ use anyhow::bail;
 use choices::{AllocationChoice, FilterChoice, PruneChoice, SamplingChoice, SequenceChoice, check_crop, parse_crop};
 use clap::Args;
 use fechner::adaptive::glimpse::steady_glimpse;
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, LoopSettings, Sampling};
+use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, LoopSettings, RivalRule, Sampling};
 use fechner::checkpoint::SettingsRecord;
+use fechner::film::Film;
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, Pruning, TraceSettings};
 use fechner::output::rendered::Background;
 use fechner::scene::hash::ContentHash;
@@ -63,10 +64,10 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, help_heading = "Until")]
     time: Option<Duration>,
     /// Stop at this mean number of samples a pixel.
-    #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=Film::MOST_SAMPLES_A_PIXEL), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
     /// Most samples of one pixel, at least 16.
-    #[arg(long, value_name = "N", value_parser = whole(16..=u32::MAX), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(16..=Film::MOST_SAMPLES_A_PIXEL), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
     max_spp: u32,
     /// Stop after this many plans: repeats a render that ended by --time.
     #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
@@ -75,8 +76,10 @@ pub(super) struct JobArguments {
     /// How samples are spread.
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
     sampling: SamplingChoice,
-    /// Threshold at which --sampling relative and variance stop [default: 0.01].
-    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
+    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling", help = format!(
+        "Threshold at which --sampling relative and variance stop [default: {}]",
+        RivalRule::USUAL_THRESHOLD,
+    ))]
     noise_threshold: Option<f64>,
     /// How --sampling adaptive finds counts [default: convex].
     #[arg(long, value_enum, help_heading = "Sampling")]

@@ -3,7 +3,7 @@
 mod start;
 mod watch;
 
-pub(super) use start::{CheckpointArguments, SeedsSoFar, Start, fit_in};
+pub(super) use start::{CheckpointArguments, DEFAULT_CHECKPOINT_SECONDS, SeedsSoFar, Start, fit_in};
 pub(super) use watch::Watch;
 
 use super::words::count;
@@ -41,7 +41,7 @@ impl Keeper {
         let now = Instant::now();
         Self {
             path: arguments.checkpoint.clone().unwrap_or_default(),
-            every: arguments.checkpoint_every.unwrap_or(Duration::from_secs(60)),
+            every: arguments.checkpoint_every,
             header,
             seeds,
             history: Mutex::new(History {
@@ -95,6 +95,7 @@ impl Keeper {
         history.longest_write = history.longest_write.max(snapshot.elapsed());
         history.writing += snapshot.elapsed();
     }
+
     /// Says what keeping the film took of the `whole` time.
     ///
     /// # Errors
@@ -147,8 +148,7 @@ mod tests {
     fn what_fails_is_kept() {
         let folder = tempfile::tempdir().expect("a folder");
         let film = folder.path().join("film");
-        let arguments =
-            CheckpointArguments { checkpoint: Some(film.clone()), checkpoint_every: Some(EVERY), resume: false };
+        let arguments = CheckpointArguments { checkpoint: Some(film.clone()), checkpoint_every: EVERY, resume: false };
         let keeper = Keeper::new(&arguments, header(), SeedsSoFar::of_one(0));
         let watch = Watch::new(Arc::default(), Console::new(None), Some(keeper), None, None);
         watch.failed(&RenderState::new(1, 1, &Limits::of_visibility(1.0)));
@@ -161,7 +161,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let arguments = CheckpointArguments {
             checkpoint: Some(folder.path().join("gone/film")),
-            checkpoint_every: Some(EVERY),
+            checkpoint_every: EVERY,
             resume: false,
         };
         let mut keeper = Keeper::new(&arguments, header(), SeedsSoFar::of_one(0));

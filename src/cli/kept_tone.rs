@@ -5,7 +5,7 @@ use super::picture::InputPicture;
 use super::seeing::tone_operator;
 use anyhow::Result;
 use fechner::exr_read::ExrImage;
-use fechner::output::{Attribute, DISPLAY, TONE};
+use fechner::output::{Attribute, attribute};
 use fechner_perception::Plane;
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::{self, DEFAULT_OPERATOR, FittedTone, SavedTone, SceneGuide, ToneSettings};
@@ -37,14 +37,14 @@ impl KeptTone {
         if text(exr, LIGHT) == Some(OF_DISPLAY) {
             return Some(Self::Displayed);
         }
-        text(exr, "fechner.scene")?;
+        text(exr, attribute::SCENE)?;
         Some(Self::Rendered(Box::new(RenderTone {
-            fitted: serde_json::from_str(text(exr, TONE)?).ok()?,
-            display: text(exr, "fechner.observer.display")?.to_owned(),
+            fitted: serde_json::from_str(text(exr, attribute::TONE)?).ok()?,
+            display: text(exr, attribute::OBSERVER_DISPLAY)?.to_owned(),
             luminances_cd_m2: [
-                number(exr, "fechner.observer.white_cd_m2")?,
-                number(exr, "fechner.observer.black_cd_m2")?,
-                number(exr, "fechner.observer.ambient_cd_m2")?,
+                number(exr, attribute::OBSERVER_WHITE_CD_M2)?,
+                number(exr, attribute::OBSERVER_BLACK_CD_M2)?,
+                number(exr, attribute::OBSERVER_AMBIENT_CD_M2)?,
             ],
         })))
     }
@@ -89,27 +89,25 @@ fn described(description: &str) -> Option<Display> {
 
 /// What to say of a file whose description of its display is damaged.
 pub(super) fn display_not_read(exr: &ExrImage) -> Option<String> {
-    let description = text(exr, DISPLAY)?;
+    let description = text(exr, attribute::DISPLAY)?;
     let is_damaged = described(description).is_none();
-    is_damaged.then(|| format!("its {DISPLAY} cannot be read, and is not looked at"))
+    is_damaged.then(|| format!("its {} cannot be read, and is not looked at", attribute::DISPLAY))
 }
 
 /// The display that a file was made for: as the file has it, else, of an older or a damaged one, the preset that it names, where that is
 /// still the same.
 pub(super) fn display_in(exr: &ExrImage) -> Option<Display> {
-    if let Some(display) = text(exr, DISPLAY).and_then(described) {
+    if let Some(display) = text(exr, attribute::DISPLAY).and_then(described) {
         return Some(display);
     }
-    let preset = Display::preset(text(exr, "fechner.observer.display")?)?;
+    let preset = Display::preset(text(exr, attribute::OBSERVER_DISPLAY)?)?;
     let values = [
-        ("pixels_per_degree", preset.pixels_per_degree),
-        ("white_cd_m2", preset.white_cd_m2),
-        ("black_cd_m2", preset.black_cd_m2),
-        ("ambient_cd_m2", preset.ambient_cd_m2),
+        (attribute::OBSERVER_PIXELS_PER_DEGREE, preset.pixels_per_degree),
+        (attribute::OBSERVER_WHITE_CD_M2, preset.white_cd_m2),
+        (attribute::OBSERVER_BLACK_CD_M2, preset.black_cd_m2),
+        (attribute::OBSERVER_AMBIENT_CD_M2, preset.ambient_cd_m2),
     ];
-    let is_same = |&(name, value): &(&str, f64)| {
-        number(exr, &format!("fechner.observer.{name}")).is_none_or(|said| said == value as f32)
-    };
+    let is_same = |&(name, value): &(&str, f64)| number(exr, name).is_none_or(|said| said == value as f32);
     values.iter().all(is_same).then_some(preset)
 }
 

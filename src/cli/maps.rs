@@ -14,6 +14,14 @@ pub(super) struct MapTarget {
     file: PathBuf,
 }
 
+/// Tells whether a map can be written, before what it shows is made: it is a picture to look at.
+pub(super) fn check_map(path: &Path) -> Result<()> {
+    if output::check_target(path)? != Format::Png {
+        bail!("{}: --map writes a picture to look at; end the name in .png", path.display());
+    }
+    Ok(())
+}
+
 /// What a map can show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum MapLayer {
@@ -42,14 +50,6 @@ impl MapTarget {
     /// The file to write.
     pub(super) fn file(&self) -> &Path {
         &self.file
-    }
-
-    /// Tells whether it can be written, before the picture is rendered.
-    pub(super) fn check(&self) -> Result<()> {
-        if output::check_target(&self.file)? != Format::Png {
-            bail!("{}: --map writes a picture to look at; end the name in .png", self.file.display());
-        }
-        Ok(())
     }
 
     /// Writes it, and says what its colours mean.

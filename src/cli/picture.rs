@@ -1,4 +1,4 @@
-//! Pictures of any renderer as the input of `compare` and `threshold`.
+//! Pictures of any renderer as the input of `compare`, `threshold` and `tonemap`, as frames of a video, and as maps of importance.
 
 mod from_file;
 

@@ -5,7 +5,7 @@ use super::console::Console;
 use super::job::{JobArguments, Prepared};
 use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, SeedsSoFar, Start, Watch};
-use super::maps::MapTarget;
+use super::maps::{MapTarget, check_map};
 use super::report::{Interrupter, Report, summary};
 use super::signals::listen;
 use super::targets::{Named, check_kept, check_scene_kept};
@@ -54,7 +54,7 @@ pub(super) struct RenderArguments {
 pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
     let format = output::check_target(&arguments.output)?;
     check_kept(&arguments.job.files(), &written(arguments))?;
-    arguments.maps.iter().try_for_each(MapTarget::check)?;
+    arguments.maps.iter().try_for_each(|map| check_map(map.file()))?;
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
     }
@@ -169,10 +169,10 @@ impl FilesWritten {
         let background = arguments.job.background();
         let write = |path: &Path| write_picture(path, format, background, rendered, settings, report, part_of);
         let picture = write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error));
-        let maps = arguments.maps.iter().try_for_each(|map| {
+        let maps = all_written(arguments.maps.iter().map(|map| {
             say!("{}", map.write(rendered, settings.limits.visibility_or_threshold())?);
             Ok(())
-        });
+        }));
         let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, report));
         Self { picture, maps, figures }
     }

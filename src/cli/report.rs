@@ -11,9 +11,9 @@ use fechner::adaptive::pursuit::Pursuit;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
-use fechner::output::{self, Attribute};
+use fechner::output::{self, Attribute, attribute};
 use fechner_perception::Plane;
-use fechner_perception::csf;
+use fechner_perception::csf::{self, FreshNoise};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::model;
 use fechner_perception::psychometric::detection_probability;
@@ -181,7 +181,7 @@ impl Report {
             seeds: seeds.to_vec(),
             sampling: sampling_name(settings.sampling),
             model: settings.model.as_ref().map_or(model::DEFAULT, |model| model.name()),
-            csf: if settings.frames.is_some() { "castle-fresh-noise" } else { csf::DEFAULT },
+            csf: if settings.frames.is_some() { FreshNoise::NAME } else { csf::DEFAULT },
             operator: judgement.tone.describe(),
             nits_per_unit: settings.nits_per_unit,
             observer: ObserverReport::of(&settings.viewing),
@@ -198,7 +198,7 @@ impl Report {
             visibility_p99: quantile(0.99),
             visibility_p999: quantile(0.999),
             visibility_max: quantile(1.0),
-            fraction_visible: predicted.map(|_| visible_share(judgement, target.unwrap_or(1.0))),
+            fraction_visible: predicted.map(|_| visible_share(judgement, settings.limits.visibility_or_threshold())),
             detection_probability_p99: quantile(0.99).map(detection_probability),
             patches_noticed: predicted.map(|predicted| patches_noticed(predicted, &settings.viewing.display)),
             measured_over_predicted: predicted
@@ -238,20 +238,20 @@ impl Report {
         let text = |s: &str| Attribute::Text(s.to_owned());
         let number = |x: f64| Attribute::Float(x as f32);
         let mut attributes = vec![
-            ("fechner.scene", text(&self.scene)),
+            (attribute::SCENE, text(&self.scene)),
             ("fechner.seed", text(&self.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(", "))),
             ("fechner.sampling", text(self.sampling)),
-            ("fechner.model", text(self.model)),
-            ("fechner.csf", text(self.csf)),
+            (attribute::MODEL, text(self.model)),
+            (attribute::CSF, text(self.csf)),
             ("fechner.eye", text(&self.eye)),
-            ("fechner.operator", text(&self.operator)),
+            (attribute::OPERATOR, text(&self.operator)),
             ("fechner.seen", text("display")),
             ("fechner.latitude_stops", Attribute::Float(0.0)),
-            ("fechner.observer.display", text(&self.observer.display)),
-            ("fechner.observer.pixels_per_degree", number(self.observer.pixels_per_degree)),
-            ("fechner.observer.white_cd_m2", number(self.observer.white_cd_m2)),
-            ("fechner.observer.black_cd_m2", number(self.observer.black_cd_m2)),
-            ("fechner.observer.ambient_cd_m2", number(self.observer.ambient_cd_m2)),
+            (attribute::OBSERVER_DISPLAY, text(&self.observer.display)),
+            (attribute::OBSERVER_PIXELS_PER_DEGREE, number(self.observer.pixels_per_degree)),
+            (attribute::OBSERVER_WHITE_CD_M2, number(self.observer.white_cd_m2)),
+            (attribute::OBSERVER_BLACK_CD_M2, number(self.observer.black_cd_m2)),
+            (attribute::OBSERVER_AMBIENT_CD_M2, number(self.observer.ambient_cd_m2)),
             ("fechner.observer.sensitivity", number(self.observer.sensitivity)),
             ("fechner.observer.csf_area_deg2", number(self.observer.csf_area_deg2)),
             ("fechner.plans", Attribute::Integer(self.plans.try_into().unwrap_or(i32::MAX))),

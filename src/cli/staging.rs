@@ -9,6 +9,7 @@ use fechner::scene::load::sky::{self, Sky};
 use fechner::scene::load::{LoadOptions, NO_CAMERA, megabytes};
 use fechner::scene::{Camera, Environment, FilmDefaults, Projection, Scene};
 use glam::Vec3;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 /// What is chosen of the scene, and what is put in the place of its own.
@@ -68,8 +69,11 @@ fn parse_surroundings(text: &str) -> Result<Surroundings, String> {
         turbidity: at(2, default.turbidity),
         ..default
     };
-    if !(0.0..=90.0).contains(&sky.sun_elevation_deg) || !(2.0..=10.0).contains(&sky.turbidity) {
-        return Err(format!("\"{text}\": the elevation must lie in [0, 90] degrees, the turbidity in [2, 10]"));
+    if !Sky::ELEVATION_DEG.contains(&sky.sun_elevation_deg) || !Sky::TURBIDITY.contains(&sky.turbidity) {
+        let [(low, high), (clear, hazy)] = [Sky::ELEVATION_DEG, Sky::TURBIDITY].map(RangeInclusive::into_inner);
+        return Err(format!(
+            "\"{text}\": the elevation must lie in [{low}, {high}] degrees, the turbidity in [{clear}, {hazy}]"
+        ));
     }
     Ok(Surroundings::Sky(sky))
 }

@@ -15,7 +15,7 @@ use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::exr_read::ExrImage;
-use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture, channel};
+use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture, attribute, channel};
 use fechner_perception::colour::chromatic_visibility;
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs, ThresholdModel};
@@ -153,8 +153,8 @@ impl Asked {
             None => None,
             Some((path, exr)) => {
                 check_knows_motion(model.as_ref())?;
-                let motions = velocity_in(path, exr, viewing.display.frames_per_second)?;
-                Some(Motion::of(&motions, arguments.saliency, &guide, fitted.as_deref(), &viewing)?)
+                let motion = velocity_in(path, exr, viewing.display.frames_per_second)?;
+                Some(Motion::of(&motion, arguments.saliency, &guide, fitted.as_deref(), &viewing)?)
             }
         };
         Ok(Self { guide, halves, made_of, display, viewing, model, csf, fitted, motion })
@@ -221,15 +221,15 @@ impl Asked {
             picture.push_f32(channel::VISIBILITY, visibility.values());
         }
         let text = |s: &str| Attribute::Text(s.to_owned());
-        picture.push_attribute("fechner.model", text(self.model.name()));
+        picture.push_attribute(attribute::MODEL, text(self.model.name()));
         if self.model.knows_csf() {
-            picture.push_attribute("fechner.csf", text(self.csf.name()));
+            picture.push_attribute(attribute::CSF, text(self.csf.name()));
         }
         let display = &self.viewing.display;
-        picture.push_attribute("fechner.observer.display", text(&display.name));
+        picture.push_attribute(attribute::OBSERVER_DISPLAY, text(&display.name));
         picture.attributes.extend(self.display.clone());
         let ppd = display.pixels_per_degree as f32;
-        picture.push_attribute("fechner.observer.pixels_per_degree", Attribute::Float(ppd));
+        picture.push_attribute(attribute::OBSERVER_PIXELS_PER_DEGREE, Attribute::Float(ppd));
         if self.motion.is_some() {
             let rate = display.frames_per_second as f32;
             picture.push_attribute("fechner.observer.frames_per_second", Attribute::Float(rate));
@@ -263,7 +263,8 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
     let halves = [a?, b?];
     if halves[0].codes() == halves[1].codes() {
         bail!(
-            "--halves {} {}: equal in every value, which tells nothing of noise: one picture twice, two renders by one seed, or a scene without noise; give two renders by different seeds",
+            "--halves {} {}: equal in every value, which tells nothing of noise: one picture twice, two renders by one seed, or a \
+             scene without noise; give two renders by different seeds",
             a_path.display(),
             b_path.display()
         );

@@ -14,6 +14,7 @@ use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, display_help, operator_values_or_all};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use fechner::animate::USUAL_FRAMES_PER_SECOND;
 use fechner::output::{self, Format, PartOf, Shown};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
@@ -30,8 +31,8 @@ pub(super) struct TonemapArguments {
     #[arg(required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// .png (16-bit PQ for an HDR display, sRGB for all others, which colour management brings to them), .exr with what the
-    /// display emits in units of its white: `absolute` shows that as it is. The name of a sequence has # for each digit of the frame's number: night.####.png. Numbers are those in the inputs' names where all
-    /// have different ones, and else count from 1.
+    /// display emits in units of its white: `absolute` shows that as it is. The name of a sequence has # for each digit of the frame's number:
+    /// night.####.png. Numbers are those in the inputs' names where all have different ones, and else count from 1.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Tone operator, or "all" for a sheet with all of them [default: as the picture was shown when it was rendered, if its file says so].
@@ -55,8 +56,9 @@ pub(super) struct TonemapArguments {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     effects: Option<Vec<Effect>>,
 
-    /// Frames a second of a sequence, 0.001 to 1000; numbers that are missing take their time [default: 24].
-    #[arg(long, value_name = "N", value_parser = parse_lapse_rate, allow_negative_numbers = true, help_heading = "Over time")]
+    #[arg(long, value_name = "N", value_parser = parse_lapse_rate, allow_negative_numbers = true, help_heading = "Over time", help = format!(
+        "Frames a second of a sequence, 0.001 to 1000; numbers that are missing take their time [default: {USUAL_FRAMES_PER_SECOND}]",
+    ))]
     fps: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Over time")]
@@ -300,9 +302,6 @@ fn settings(arguments: &TonemapArguments) -> Result<ToneSettings> {
     })
 }
 
-/// Operators that lose colour whatever is asked for.
-const ALWAYS_WITHOUT_COLOUR: [&str; 3] = ["ferwerda96", "durand-dorsey00", "pattanaik00"];
-
 /// Refuses what changes nothing of an operator.
 fn check_settings(operator: &dyn ToneOperator, settings: &ToneSettings) -> Result<()> {
     let name = operator.name();
@@ -323,7 +322,7 @@ fn check_settings(operator: &dyn ToneOperator, settings: &ToneSettings) -> Resul
     let effects = [
         ("glare", chosen.glare, Effects { glare: true, ..nothing }),
         ("acuity", chosen.acuity, Effects { acuity: true, ..nothing }),
-        ("colour", chosen.colour && !ALWAYS_WITHOUT_COLOUR.contains(&name), Effects { colour: true, ..nothing }),
+        ("colour", chosen.colour && !operator.always_loses_colour(), Effects { colour: true, ..nothing }),
     ];
     if let Some((effect, ..)) = effects.iter().find(|(_, is_chosen, effect)| *is_chosen && !knows(*effect)) {
         bail!("--effects {effect}: {name} does not show it");
@@ -356,7 +355,12 @@ impl Eye {
             state = Some(read.with_context(|| format!("{}: not an eye's state as tonemap leaves it", path.display()))?);
             is_between_frames = true;
         }
-        Ok(Self { state, is_between_frames, seconds_per_frame: arguments.fps.unwrap_or(24.0).recip(), kinetics })
+        Ok(Self {
+            state,
+            is_between_frames,
+            seconds_per_frame: arguments.fps.unwrap_or(USUAL_FRAMES_PER_SECOND).recip(),
+            kinetics,
+        })
     }
 
     /// The state in which the next frame is seen, so many frames after the last. The first one is seen as it appears; between frames
@@ -372,5 +376,20 @@ impl Eye {
         self.is_between_frames = true;
         self.state = Some(state);
         state
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_help_names_all_operators_that_always_lose_colour() {
+        let value = Effect::Colour.to_possible_value().expect("a value");
+        let help = value.get_help().expect("help").to_string();
+        for name in tone::operator_names() {
+            let operator = tone::operator(name, None).expect("known");
+            assert_eq!(help.contains(name), operator.always_loses_colour(), "{name}: {help}");
+        }
     }
 }

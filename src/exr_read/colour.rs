@@ -25,8 +25,8 @@ impl ExrImage {
     /// The picture in linear Rec.709 RGB over the display window; `None` where there is neither R, G and B nor luminance.
     ///
     /// `find` finds a channel R, G or B by its last name (renderers prefix layers). Without them X, Y and Z of the layer that has luminance
-    /// ([`luminance_layer`]) are CIE XYZ. Chromaticities are honoured: colours stay what they are, white included. Not finite values become 0 (NaN, −∞) or (∞) the largest finite value of the picture, at least 65504: what
-    /// overflows a half is a lamp or the sun, brighter than all else.
+    /// ([`luminance_layer`]) are CIE XYZ. Chromaticities are honoured: colours stay what they are, white included. Not finite values become 0 (NaN,
+    /// −∞) or (∞) the largest finite value of the picture, at least 65504: what overflows a half is a lamp or the sun, brighter than all else.
     pub fn scene_picture<'a>(&'a self, find: impl Fn(&'a Self, &str) -> Option<&'a [f32]>) -> Option<ScenePicture> {
         let mut notes = Vec::new();
         let mut primaries = self.chromaticities.unwrap_or(Primaries::REC709);

@@ -2,14 +2,18 @@
 
 use super::{Film, HalfPixel, PixelGuide, kept_m2, opponent};
 use crate::sampler::Half;
+use fechner_perception::PIXELS_A_TASK;
 use rayon::prelude::*;
 
 /// Most samples of a pixel's half that a film may hold: sums of a few films stay far from where counts wrap around.
 const MOST_TAKEN: u32 = 1 << 29;
-/// Pixels that are worth handing to another thread.
-const PIXELS_A_TASK: usize = 1 << 12;
 
 impl Film {
+    /// Most samples of a pixel that a film may hold.
+    pub const MOST_SAMPLES_A_PIXEL: u32 = 2 * MOST_TAKEN;
+    /// Most pixels that a film may have: they are numbered by `u32`, and halves of them counted.
+    pub const MOST_PIXELS: u32 = u32::MAX / 2;
+
     /// Adds the samples of another film, half to half: as if one film had taken both. The other must be of this size and
     /// of other random numbers.
     ///
@@ -62,7 +66,7 @@ impl Film {
     /// Says what is wrong.
     pub fn check(&self) -> Result<(), &'static str> {
         let pixels = u64::from(self.width) * u64::from(self.height);
-        if pixels == 0 || pixels > u64::from(u32::MAX) / 2 {
+        if pixels == 0 || pixels > u64::from(Self::MOST_PIXELS) {
             return Err("its size makes no sense");
         }
         let lengths = [self.halves[0].len(), self.halves[1].len(), self.guides.len(), self.guides_of_a.len()];

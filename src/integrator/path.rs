@@ -340,11 +340,13 @@ fn pass_sheet(path: &mut PathState, hit: &Hit, point: &SurfacePoint, share: Vec3
 /// Russian roulette by throughput from the fourth bounce on.
 fn survives(path: &mut PathState, bounce: u32, u: f32) -> bool {
     const FIRST_BOUNCE: u32 = 3;
+    /// No path goes on for ever, even where nothing absorbs: [`super::DEFAULT_MAX_DEPTH`] counts on both.
     const ALWAYS_MORTAL_FROM: u32 = 8;
+    const MOST_SURVIVAL: f32 = 0.98;
     if bounce < FIRST_BOUNCE {
         return true;
     }
-    let most = if bounce < ALWAYS_MORTAL_FROM { 1.0 } else { 0.98 };
+    let most = if bounce < ALWAYS_MORTAL_FROM { 1.0 } else { MOST_SURVIVAL };
     let survival = (path.throughput.max_element() * path.radiance_gain_on_exit).min(most);
     if u >= survival {
         return false;

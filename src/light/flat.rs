@@ -42,6 +42,12 @@ pub(super) struct FlatEmitter {
 /// Bound of the solid angle in steradian below which a parallelogram is sampled by its corners.
 const MOST_BILINEAR: f32 = 1.0;
 
+/// Corners that lie this near to each other, as a share of the triangle's size, are one; edges whose cosine is below it are at a right
+/// angle.
+const ROUNDING: f32 = 1e-5;
+/// Least cosine between the normals of two triangles in one plane.
+const COPLANAR: f32 = 0.999_99;
+
 /// What the two edges span.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Outline {
@@ -121,14 +127,14 @@ impl FlatEmitter {
 
     /// Both triangles as one, if they are the halves a, b, c and a, c, d of a parallelogram that emits evenly.
     pub(super) fn merged(&self, next: &Self, scene: &Scene) -> Option<Self> {
-        let tolerance = 1e-5 * (self.edge_1.abs() + self.edge_2.abs()).max_element();
+        let tolerance = ROUNDING * (self.edge_1.abs() + self.edge_2.abs()).max_element();
         let near = |a: Vec3, b: Vec3| (a - b).abs().max_element() <= tolerance;
         let third = self.corner + self.edge_2;
         let is_one = near(self.corner, next.corner)
             && near(third, next.corner + next.edge_1)
             && near(self.edge_2 - self.edge_1, next.edge_2)
             && self.both_sides == next.both_sides
-            && self.normal.dot(next.normal) > 0.999_99;
+            && self.normal.dot(next.normal) > COPLANAR;
         let material = &scene.materials[scene.instances[self.object as usize].material.0 as usize];
         if !is_one {
             return None;
@@ -137,7 +143,7 @@ impl FlatEmitter {
         let (edge_1, edge_2) = (self.edge_1, next.edge_2);
         let cosine = edge_1.normalize_or_zero().dot(edge_2.normalize_or_zero());
         let corners = parallelogram_corners(self.corner, edge_1, edge_2);
-        let outline = match cosine.abs() < 1e-5 {
+        let outline = match cosine.abs() < ROUNDING {
             true => Outline::Rectangle(corners, Edges::new([edge_1, edge_2])),
             false => Outline::Parallelogram(corners),
         };

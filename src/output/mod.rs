@@ -6,6 +6,7 @@
 //!
 //! Call [`check_target`] before a long render: it finds out whether the file can be written at all.
 
+pub mod attribute;
 mod beside;
 pub mod channel;
 mod exr_file;
@@ -46,8 +47,6 @@ pub const PIXEL_ASPECT_RATIO: &str = "pixelAspectRatio";
 /// Written by [`write_exr`] where the picture is a part of a larger one: left, top, width and height in pixels. Readers here show
 /// such a part alone, not the display window around it.
 pub const CROP: &str = "fechner.crop";
-/// The display that a picture was made for, see [`display_attribute`].
-pub const DISPLAY: &str = "fechner.display";
 
 /// All of a display as JSON, in ASCII: readers take an attribute's text for UTF-8, the writer has Latin-1.
 pub fn display_attribute(display: &Display) -> Option<(String, Attribute)> {
@@ -60,18 +59,15 @@ pub fn display_attribute(display: &Display) -> Option<(String, Attribute)> {
             character.encode_utf16(&mut [0; 2]).iter().for_each(|unit| ascii += &format!("\\u{unit:04x}"));
         }
     }
-    Some((DISPLAY.to_owned(), Attribute::Text(ascii)))
+    Some((attribute::DISPLAY.to_owned(), Attribute::Text(ascii)))
 }
-
-/// The fit of the tone operator, see [`tone_attribute`].
-pub const TONE: &str = "fechner.tone";
 
 /// The fit of a tone operator as JSON of a [`fechner_perception::tone::SavedTone`]. None for one that knows places: it has values
 /// for each pixel, and can be fitted to the picture again.
 pub fn tone_attribute(fitted: &dyn FittedTone) -> Option<(String, Attribute)> {
     const LONGEST: usize = 1 << 16;
     let text = serde_json::to_string(&fitted.save()).ok().filter(|text| text.len() <= LONGEST)?;
-    Some((TONE.to_owned(), Attribute::Text(text)))
+    Some((attribute::TONE.to_owned(), Attribute::Text(text)))
 }
 
 /// A picture of named channels, row-major from the top left.

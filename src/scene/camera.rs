@@ -72,6 +72,9 @@ impl Camera {
     /// Full fields of view in degrees that a file or a command may ask for.
     pub const FOV_DEG: RangeInclusive<f64> = 0.001..=179.0;
 
+    /// Full vertical field of view, degrees, of cameras that nothing is said of.
+    pub const USUAL_FOV_DEG: f32 = 40.0;
+
     /// Whether two unit vectors are far enough from parallel to say how a picture lies.
     pub fn axes_span(forward: Vec3, up: Vec3) -> bool {
         forward.cross(up).length() >= 1e-5

@@ -1,6 +1,6 @@
 //! The metal-roughness model of glTF 2.0, as scene files tell it.
 
-use super::{ColorInput, Relief, ScalarInput};
+use super::{ColorInput, Relief, ScalarInput, USUAL_IOR};
 use glam::Vec3;
 
 /// Which normal a clear coat has.
@@ -21,7 +21,7 @@ pub struct MetalRoughness {
     pub metallic: ScalarInput,
     /// Perceptual roughness in [0, 1].
     pub roughness: ScalarInput,
-    /// Index of refraction of the dielectric part: 1.5 unless told, as [`MetalRoughness::problem_with_ior`] takes it.
+    /// Index of refraction of the dielectric part: [`USUAL_IOR`] unless told, as [`MetalRoughness::problem_with_ior`] takes it.
     pub ior: f32,
     /// Share of the dielectric part's light that goes through, not into diffuse reflection: straight through a thin sheet, or
     /// refracted into a volume if there is one.
@@ -53,7 +53,7 @@ impl Default for MetalRoughness {
             base_color: ColorInput::constant(Vec3::ONE),
             metallic: ScalarInput::constant(0.0),
             roughness: ScalarInput::constant(0.5),
-            ior: 1.5,
+            ior: USUAL_IOR,
             transmission: ScalarInput::constant(0.0),
             volume: None,
             specular: ScalarInput::constant(1.0),

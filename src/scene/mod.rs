@@ -34,6 +34,9 @@ use std::f32::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
+/// Index of refraction where none is told: that of glass, which reflects 4 % face on.
+pub const USUAL_IOR: f32 = 1.5;
+
 /// Index into [`Scene::meshes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct MeshId(pub u32);
@@ -92,7 +95,7 @@ impl Default for Scene {
         Self {
             name: String::new(),
             nits_per_unit: 1.0,
-            camera: Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0),
+            camera: Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, Camera::USUAL_FOV_DEG),
             shutter_s: 0.0,
             film: FilmDefaults { width: 1, height: 1 },
             viewing: ViewingDefaults::default(),

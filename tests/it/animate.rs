@@ -107,6 +107,27 @@ fn finished_frames_are_kept() {
     assert!(!said.contains("is there"), "{said}");
 }
 
+/// A frame names its rate, even one that may be paused, and that is judged alike at any rate.
+#[test]
+fn frames_of_another_rate_are_made_anew() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let said = |rate: &str| {
+        let arguments = ["--frames", "0..0", "--spp", "4", "--pausable", "-o", "shot.##.exr", "--fps", rate];
+        let still = SCENE.replace(
+            "keyframes = [ { time = 0.0, translate = [-1, 0, 0] }, { time = 1.0, translate = [1, 0, 0] } ]",
+            "",
+        );
+        let still = still.replace(
+            "time = 1.0, position = [0.5, 1, 4], look_at = [0.2",
+            "time = 1.0, position = [0, 1, 4], look_at = [0",
+        );
+        animate_scene(folder.path(), &still, &arguments)
+    };
+    said("24");
+    assert!(said("24").contains("is there"));
+    assert!(!said("60").contains("is there"));
+}
+
 /// The operator's settings are a frame's own as much as its name, from the command line and from the scene, budget or not.
 #[test]
 fn another_exposure_makes_frames_anew() {

@@ -225,3 +225,32 @@ fn damaged_gltf_never_panics() {
         }
     }
 }
+
+/// A pipe has no header to be asked for: opening it would wait for whoever writes to it, for ever.
+#[test]
+#[cfg(unix)]
+fn pipes_in_the_place_of_textures_are_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(folder.path().join("pipe.png")).status().unwrap().success());
+    let mitsuba = |bsdf: &str| {
+        let shape = format!("<shape type=\"rectangle\">{bsdf}</shape>");
+        format!("<scene version=\"3.0.0\"><emitter type=\"constant\"/>{shape}</scene>")
+    };
+    let bitmap = |name: &str| {
+        let file = "<string name=\"filename\" value=\"pipe.png\"/>";
+        format!("<texture type=\"bitmap\" name=\"{name}\">{file}</texture>")
+    };
+    let rough = mitsuba(&format!("<bsdf type=\"roughplastic\">{}</bsdf>", bitmap("alpha")));
+    let masked = mitsuba(&format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("opacity")));
+    let metal = "WorldBegin\nLightSource \"infinite\"\nTexture \"t\" \"float\" \"imagemap\" \"string filename\" \"pipe.png\"\n\
+                 Material \"conductor\" \"texture roughness\" \"t\"\nShape \"sphere\"\n";
+    for (name, text) in [("rough.xml", rough.as_str()), ("masked.xml", &masked), ("metal.pbrt", metal)] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+        let mut command = assert_cmd::Command::cargo_bin("fechner").unwrap();
+        command.current_dir(folder.path()).args(["render", name, "--size", "8x8", "--spp", "1", "-o", "a.png"]);
+        let output = command.timeout(std::time::Duration::from_secs(60)).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{name}: {said}");
+        assert!(said.contains("pipe.png: is not a regular file"), "{name}: {said}");
+    }
+}

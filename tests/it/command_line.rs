@@ -482,7 +482,7 @@ fn impossible_pictures_are_refused() {
         arguments.extend(extra);
         arguments.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>()
     };
-    let cases: [(&[&'static str], &[&str]); 6] = [
+    let cases: [(&[&'static str], &[&str]); 8] = [
         (&["--filter", "mitchell"], &["negative lobes", "--sampling uniform", "blackman-harris"]),
         (
             &["--filter", "mitchell", "--sampling", "uniform", "--quality", "draft"],
@@ -493,6 +493,9 @@ fn impossible_pictures_are_refused() {
         (&["--filter", "mitchell", "--sampling", "uniform", "--transparent"], &["alpha knows nothing of"]),
         (&["--crop", "20,0,20,10"], &["--crop 20,0,20,10 reaches beyond the picture of 32x32 pixels"]),
         (&["--crop", "1,2,3"], &["expected X,Y,WIDTH,HEIGHT"]),
+        // More samples than a film may hold.
+        (&["--spp", "1073741825"], &["is not a whole number from 1 to 1073741824"]),
+        (&["--max-spp", "1073741825"], &["is not a whole number from 16 to 1073741824"]),
     ];
     for (extra, fragments) in cases {
         let arguments = with(extra);

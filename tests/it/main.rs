@@ -7,12 +7,15 @@
 //! - `coverage`: alpha: stacks, spheres, lamps that no ray meets
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
 //! - `bench`: the benchmark from end to end, small
+//! - `small_lamps`: lamps smaller than a pixel, which the first samples may pass by
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `denoise`: denoised pictures: the raw mean beside them, equal bytes, libraries that are not there
 //! - `formats`: the same scene from several formats
 //! - `gltf_counts`: attributes of glTF that do not fit their meshes
 //! - `gltf_motion`: jumps, hidden things and morphing nodes of glTF while the shutter is open
 //! - `mitsuba_format`, `mitsuba_cameras`, `pbrt_format`: what their files mean where readers go wrong easily
+//! - `mitsuba_textures`: colours, numbers, pictures and spectra of Mitsuba's files
+//! - `animate`: the frames of a shot in any order and from any process, kept when they are there
 //! - `animate_mishaps`: shots that are refused before anything is rendered, or named
 //! - `bad_input`: bad scene files, and our own ones
 //! - `own_format`: lamps of a luminous power, keys that change nothing, files beside the scene

@@ -93,7 +93,7 @@ fn what_cannot_be_written_keeps_nothing_else() {
     assert!(error.contains("b.exr: File too large") && error.contains("b.film: File too large"), "{error}");
 }
 
-/// Figures that cannot be written leave the picture and what is said of it.
+/// Figures and maps that cannot be written leave the picture, other maps, and what is said of them.
 #[test]
 #[cfg(unix)]
 fn figures_that_are_lost_take_nothing_along() {
@@ -103,17 +103,18 @@ fn figures_that_are_lost_take_nothing_along() {
     let mut command = fechner(folder.path());
     command.args(["render", "s.toml", "--size", "64x64", "--time", "1", "--visibility", "0.001", "-o", "a.png"]);
     command.args(["--checkpoint", "a.film", "--checkpoint-every", "0.001"]);
+    command.args(["--map", "samples=figures/a.png", "--map", "visibility=kept.png"]);
     let mut child = command.args(["--json", "figures/a.json"]).stderr(Stdio::piped()).spawn().expect("runs");
     // By then it has found that its figures can be written.
     crate::support::wait_for(&folder.path().join("a.film"), &mut child);
     std::fs::remove_dir(&figures).expect("removed");
     let output = child.wait_with_output().expect("ended");
     assert_eq!(output.status.code(), Some(2));
-    assert!(
-        words(&output).contains("Stopped because") && words(&output).contains("the picture is in a.png"),
-        "{}",
-        words(&output)
-    );
+    let words = words(&output);
+    assert!(words.contains("Stopped because") && words.contains("the picture is in a.png"), "{words}");
+    let error = words.lines().last().expect("an error");
+    assert!(error.contains("figures/a.json: ") && error.contains("figures/a.png: "), "{words}");
+    assert!(folder.path().join("kept.png").exists(), "{words}");
 }
 
 /// Nor do they replace what the scene is made of.

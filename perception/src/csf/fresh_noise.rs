@@ -32,6 +32,9 @@ pub(super) const HIGHEST_HZ: f64 = 120.0;
 const HZ_STEP: f64 = 0.25;
 
 impl FreshNoise {
+    /// What reports call it.
+    pub const NAME: &'static str = "castle-fresh-noise";
+
     /// For patterns that cover `area_deg2` square degrees.
     ///
     /// # Errors
@@ -74,7 +77,7 @@ impl FreshNoise {
 
 impl ContrastSensitivity for FreshNoise {
     fn name(&self) -> &'static str {
-        "castle-fresh-noise"
+        Self::NAME
     }
 
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {

@@ -18,8 +18,8 @@ pub struct ChromaticPicture<'a> {
     pub differences: DenoisedDifferences<'a>,
 }
 
-/// What can be seen of the picture's error in this channel, in which nothing moves it towards its raw mean. `frames`: of a moving picture, whose noise is new in every frame;
-/// `None` for stills.
+/// What can be seen of the picture's error in this channel, in which nothing moves it towards its raw mean. `frames`: of a moving picture, whose
+/// noise is new in every frame; `None` for stills.
 ///
 /// # Errors
 /// As [`CastleChromatic::new`] and [`chromatic_threshold_map`], and for an impossible timing.

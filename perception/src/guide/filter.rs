@@ -9,7 +9,11 @@ use glam::Vec4;
 /// A neighbour this many standard errors away in luminance gets 1/e of the weight.
 const LUMINANCE_SIGMAS: f32 = 3.0;
 /// A neighbour this many times farther off than the surface's slope explains gets 1/e of the weight.
-const DEPTH_SLOPES: f32 = 1.5;
+pub const DEPTH_SLOPES: f32 = 1.5;
+/// A neighbour that differs by this share of the pixel's own luminance or depth gets 1/e of the weight where there is neither noise nor slope.
+const OWN_SHARE: f32 = 1e-3;
+/// Keeps what is divided by from being 0 where there is neither light nor depth.
+const NOTHING: f32 = 1e-12;
 /// Power of the cosine between normals.
 const NORMAL_SHARPNESS: f32 = 24.0;
 
@@ -18,8 +22,8 @@ const TENT: [f32; 3] = [0.25, 0.5, 0.25];
 /// Columns that are filtered at once: a vector register of the baseline.
 const LANES: usize = 4;
 
-/// From here on [`falling`] is 0.
-const GONE: f32 = 8.0;
+/// Difference, where 1 gives 1/e of the weight, from which on a neighbour has none.
+pub const GONE: f32 = 8.0;
 
 /// About exp(−x), 0 from [`GONE`] on, without the cost of an exponential.
 #[inline(always)]
@@ -115,10 +119,11 @@ impl Scales {
     fn new(light: &Rows<LIGHT_CHANNELS>, surfaces: &Rows<SURFACE_CHANNELS>, hole: usize, y: usize) -> Self {
         let mut luminance = smoothed_variance(light, y);
         for (variance, own) in luminance.iter_mut().zip(light.row(y, LUMINANCE)) {
-            *variance = 1.0 / (LUMINANCE_SIGMAS * variance.sqrt() + 1e-3 * own + 1e-12);
+            *variance = 1.0 / (LUMINANCE_SIGMAS * variance.sqrt() + OWN_SHARE * own + NOTHING);
         }
-        let per_depth =
-            |(depth, slope): (&f32, &f32)| 1.0 / (DEPTH_SLOPES * slope * hole as f32 + 1e-3 * depth.abs() + 1e-12);
+        let per_depth = |(depth, slope): (&f32, &f32)| {
+            1.0 / (DEPTH_SLOPES * slope * hole as f32 + OWN_SHARE * depth.abs() + NOTHING)
+        };
         let mut depth: Vec<f32> = surfaces.row(y, DEPTH).iter().zip(surfaces.row(y, SLOPE)).map(per_depth).collect();
         for scales in [&mut luminance, &mut depth] {
             scales.resize(light.width.next_multiple_of(LANES), 0.0);

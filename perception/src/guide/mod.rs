@@ -13,7 +13,8 @@ use filter::filter_pass;
 use fireflies::tame_fireflies;
 use surfaces::surfaces;
 
-pub use surfaces::depth_slopes;
+pub use filter::{DEPTH_SLOPES, GONE};
+pub use surfaces::{BEYOND, FARTHEST_SURFACE, depth_slopes};
 
 /// A noisy picture and what is known of its surfaces. All slices are row-major with `width * height` entries.
 #[derive(Clone, Copy, Debug)]

@@ -8,9 +8,9 @@ use crate::rows::Rows;
 /// Stands for the depth where there is no surface.
 pub(super) const NO_DEPTH: f32 = 1e15;
 /// Surfaces farther away than this are taken to be here.
-const FARTHEST: f32 = 1e14;
+pub const FARTHEST_SURFACE: f32 = 1e14;
 /// Depth beside the picture: so far from any other that what lies there never weighs anything.
-const BEYOND: f32 = 1e30;
+pub const BEYOND: f32 = 1e30;
 
 // Channels of a row of surfaces.
 pub(super) const SURFACE_CHANNELS: usize = 6;
@@ -36,8 +36,8 @@ pub(super) fn surfaces(inputs: &GuideInputs<'_>) -> Rows<SURFACE_CHANNELS> {
             let usable = normal.iter().all(|part| part.abs() <= 2.0);
             [normal_x[x], normal_y[x], normal_z[x]] = if usable { normal } else { [0.0; 3] };
             let own = inputs.depth[index];
-            depth[x] = if own.is_finite() { own.clamp(-FARTHEST, FARTHEST) } else { NO_DEPTH };
-            slope[x] = slopes[index].min(FARTHEST);
+            depth[x] = if own.is_finite() { own.clamp(-FARTHEST_SURFACE, FARTHEST_SURFACE) } else { NO_DEPTH };
+            slope[x] = slopes[index].min(FARTHEST_SURFACE);
             kind[x] = f32::from(2 * u8::from(!own.is_finite()) + u8::from(!is_divided(inputs.albedo[index])));
         }
     });

@@ -5,8 +5,8 @@
 //! function of a velocity map. Here frames are brought together along the eye's way over the picture, and what then changes
 //! from frame to frame goes through castleCSF's temporal channels (Ashraf et al. 2024): noise that is new in every frame
 //! is integrated, error that travels with an object is seen nearly as in a still, and what is locked to the screen under a
-//! moving eye is blurred, all by one filter. A frame is looked at several times while it is shown, and counts as at the worst of them. Not for stills (see [`crate::difference`]; equal frames without end give the
-//! same), nor for frames that somebody may pause.
+//! moving eye is blurred, all by one filter. A frame is looked at several times while it is shown, and counts as at the worst of them. Not for stills
+//! (see [`crate::difference`]; equal frames without end give the same), nor for frames that somebody may pause.
 
 mod gaze;
 

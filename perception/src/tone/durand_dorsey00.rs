@@ -36,6 +36,10 @@ impl ToneOperator for DurandDorsey00 {
         true
     }
 
+    fn always_loses_colour(&self) -> bool {
+        true
+    }
+
     fn sees_rods(&self) -> bool {
         true
     }

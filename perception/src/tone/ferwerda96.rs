@@ -32,6 +32,10 @@ impl ToneOperator for Ferwerda96 {
         true
     }
 
+    fn always_loses_colour(&self) -> bool {
+        true
+    }
+
     fn sees_rods(&self) -> bool {
         true
     }

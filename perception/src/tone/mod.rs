@@ -104,6 +104,11 @@ pub trait ToneOperator: Send + Sync + Debug {
         self.sees_adaptation()
     }
 
+    /// Whether it loses colour in dim light whatever it is asked for.
+    fn always_loses_colour(&self) -> bool {
+        false
+    }
+
     /// Whether it looks at what the rods see of the guide ([`SceneGuide::scotopic_cd_m2`]).
     fn sees_rods(&self) -> bool {
         false

@@ -183,6 +183,10 @@ impl ToneOperator for Pattanaik00 {
         true
     }
 
+    fn always_loses_colour(&self) -> bool {
+        true
+    }
+
     fn sees_rods(&self) -> bool {
         true
     }

@@ -1,17 +1,18 @@
 //! `fechner compare A.####.exr B.####.exr --fps F`: can one moving picture be told from another?
 
-use super::{CompareArguments, Figures, Seen, check_alike, check_map, write_map};
-use crate::cli::channels::{self, both_motions};
+use super::{CompareArguments, Figures, Seen, check_alike, write_map};
+use crate::cli::channels;
 use crate::cli::json::write_json;
 use crate::cli::kept_tone::{as_rendered, first_scene};
+use crate::cli::maps::check_map;
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
 use crate::cli::seeing::tone_operator;
 use crate::cli::targets::check_kept;
 use crate::cli::words::count;
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
+use fechner::animate::spread_over;
 use fechner::output;
-use fechner_perception::Plane;
 use fechner_perception::csf;
 use fechner_perception::display::Viewing;
 use fechner_perception::sequence::{FrameMotion, SequenceFrame, SequenceObserver};
@@ -22,9 +23,6 @@ use serde::Serialize;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-
-/// Frames, spread over the sequence, that the tone operator is fitted to.
-const FITTED_FRAMES: usize = 16;
 
 #[derive(Serialize)]
 struct SequenceFigures {
@@ -167,10 +165,9 @@ fn fit(
     nits_per_unit: Option<f64>,
     viewing: &Viewing,
 ) -> Result<Option<Box<dyn FittedTone>>> {
-    let count = numbers.len().min(FITTED_FRAMES);
     let (mut lights, mut size): (Vec<SceneLight>, _) = (Vec::new(), None);
-    for index in 0..count {
-        let path = name.of(numbers[index * numbers.len() / count]);
+    for index in spread_over(numbers.len()) {
+        let path = name.of(numbers[index]);
         let picture = InputPicture::read_frame(&path, nits_per_unit)?;
         let Some(light) = picture.scene_light(operator) else { return Ok(None) };
         if *size.get_or_insert(picture.size()) != picture.size() {
@@ -348,18 +345,7 @@ impl<'a> Sequences<'a> {
 
 /// Motion in pixels under the names that renderers give it.
 fn read_motion(path: &Path, size: (usize, usize)) -> Result<FrameMotion> {
-    let exr = channels::read_motion(path, size)?;
-    let Some(motions) = both_motions(&exr) else {
-        bail!(
-            "{}: no motion channels; velocity.X/Y (and velocity_previous.X/Y), Vector.X/Y/Z/W, motion.X/Y and forward.u/v are \
-             known, with or without a layer before them",
-            path.display()
-        );
-    };
-    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([channels::motion_plane(path, &exr, x)?, channels::motion_plane(path, &exr, y)?])
-    };
-    Ok(FrameMotion { to_next: planes(motions.to_next)?, to_previous: planes(motions.to_previous)? })
+    channels::motion_planes(path, &channels::read_motion(path, size)?)
 }
 
 #[cfg(test)]

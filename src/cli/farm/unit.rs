@@ -4,6 +4,7 @@ use super::job::{Job, JobOptions};
 use super::signals::Signals;
 use super::{CALL_AGAIN, Threads, open_for_work};
 use crate::cli::console::duration_in_words;
+use crate::cli::keeper::DEFAULT_CHECKPOINT_SECONDS;
 use crate::cli::numbers::parse_seconds;
 use crate::cli::words::{count, listed, samples_in_words};
 use anyhow::{Context, Result, bail};
@@ -36,7 +37,7 @@ pub(super) struct UnitArguments {
 #[derive(Debug, Args)]
 pub(super) struct KeepingArguments {
     /// Seconds of work that a kill may cost.
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, default_value = "60")]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, default_value = DEFAULT_CHECKPOINT_SECONDS)]
     checkpoint_every: Duration,
 }
 

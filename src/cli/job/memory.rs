@@ -3,18 +3,18 @@
 use super::choices::Size;
 use crate::cli::system_memory::available_bytes;
 use anyhow::bail;
+use fechner::film::Film;
 
 /// Refuses a size whose film and maps would not fit into memory.
 pub(in crate::cli) fn check_memory(size: Size) -> anyhow::Result<()> {
     /// Peak memory was 508 bytes a pixel at 256×256, program included (`peak_memory_bytes` of --json); the rest is margin.
     const BYTES_PER_PIXEL: u64 = 700;
-    /// Pixels are numbered by `u32`, and halves of them counted.
-    const MOST_PIXELS: u64 = u32::MAX as u64 / 2;
     let Size { width, height } = size;
     let pixels = u64::from(width) * u64::from(height);
-    if pixels > MOST_PIXELS {
+    if pixels > u64::from(Film::MOST_PIXELS) {
         bail!(
-            "a picture of {width}x{height} has more than the {MOST_PIXELS} pixels that a film may have: choose a smaller --size"
+            "a picture of {width}x{height} has more than the {} pixels that a film may have: choose a smaller --size",
+            Film::MOST_PIXELS
         );
     }
     let needed = pixels * BYTES_PER_PIXEL;

@@ -26,7 +26,7 @@ pub(super) fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow
             arguments.model
         );
     }
-    let threshold = arguments.noise_threshold.unwrap_or(0.01);
+    let threshold = arguments.noise_threshold.unwrap_or(RivalRule::USUAL_THRESHOLD);
     let sampling = match arguments.sampling {
         SamplingChoice::Adaptive => Sampling::Adaptive,
         SamplingChoice::Uniform => Sampling::Uniform,

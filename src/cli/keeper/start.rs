@@ -16,15 +16,18 @@ use fechner_perception::tone::SavedTone;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+/// What `--checkpoint-every` is where it is not given.
+pub(in crate::cli) const DEFAULT_CHECKPOINT_SECONDS: &str = "60";
+
 /// Arguments of `render` about its film's file.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct CheckpointArguments {
     /// Keep all samples in this file while rendering, for --resume and `fechner merge`.
     #[arg(long, value_name = "FILE", help_heading = "Running")]
     pub(super) checkpoint: Option<PathBuf>,
-    /// Seconds of work that a kill may cost at most [default: 60].
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, requires = "checkpoint", allow_negative_numbers = true, help_heading = "Running")]
-    pub(super) checkpoint_every: Option<Duration>,
+    /// Seconds of work that a kill may cost at most.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, requires = "checkpoint", allow_negative_numbers = true, default_value = DEFAULT_CHECKPOINT_SECONDS, help_heading = "Running")]
+    pub(super) checkpoint_every: Duration,
     /// Go on from the checkpoint, if it is there; limits count from the first start.
     #[arg(long, requires = "checkpoint", help_heading = "Running")]
     pub(super) resume: bool,

@@ -4,7 +4,7 @@ use super::{Codes, Content, InputPicture};
 use crate::cli::channels::{self, Colour};
 use crate::cli::kept_tone::{self, KeptTone};
 use anyhow::{Context, Result, bail};
-use fechner::exr_read::ExrImage;
+use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES};
 use fechner::hdr_read::{self, HdrHeader, with_known_header};
 use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
@@ -194,7 +194,7 @@ fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(1 << 15);
     limits.max_image_height = Some(1 << 15);
-    limits.max_alloc = Some(1 << 30);
+    limits.max_alloc = Some(MEMORY_LIMIT_BYTES);
     reader.limits(limits);
     let image = reader.decode().with_context(|| format!("{}: not a readable picture", path.display()))?;
     if found == ImageFormat::Jpeg && !jpeg_read::is_complete(bytes, &image) {

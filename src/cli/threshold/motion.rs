@@ -7,6 +7,7 @@ use fechner::exr_read::ExrImage;
 use fechner_perception::model::{self, ThresholdModel};
 use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::saliency::saliency_of_displayed;
+use fechner_perception::sequence::FrameMotion;
 use fechner_perception::tone::FittedTone;
 use fechner_perception::{Plane, Viewing};
 use std::path::Path;
@@ -21,15 +22,14 @@ pub(super) struct Motion {
 
 impl Motion {
     pub(super) fn of(
-        motions: &[[Plane; 2]; 2],
+        motion: &FrameMotion,
         by_saliency: bool,
         guide: &InputPicture,
         fitted: Option<&dyn FittedTone>,
         viewing: &Viewing,
     ) -> Result<Self> {
         let speed = |[x, y]: &[Plane; 2]| image_velocity_deg_s(x, y, &viewing.display);
-        let [to_next, to_previous] = motions.each_ref().map(speed);
-        let image_velocity_deg_s = to_next?.combined(&to_previous?, f32::min);
+        let image_velocity_deg_s = speed(&motion.to_next)?.combined(&speed(&motion.to_previous)?, f32::min);
         let attention = if by_saliency {
             let rgb = guide.displayed_rgb(fitted, viewing);
             Some(saliency_of_displayed(guide.size().0, &rgb, &image_velocity_deg_s, &viewing.display)?)
@@ -41,19 +41,12 @@ impl Motion {
 }
 
 /// Motion in pixels to the next frame and to the previous one, under the names that renderers give it.
-pub(super) fn velocity_in(path: &Path, exr: &ExrImage, frames_per_second: f64) -> Result<[[Plane; 2]; 2]> {
-    let (Some((layer, _)), Some(motions)) = (channels::motion(exr), channels::both_motions(exr)) else {
-        bail!(
-            "{}: no motion channels; velocity.X/Y, Vector.X/Y, motion.X/Y and forward.u/v are known, with or without a layer \
-             before them",
-            path.display()
-        );
-    };
-    answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
-    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([channels::motion_plane(path, exr, x)?, channels::motion_plane(path, exr, y)?])
-    };
-    Ok([planes(motions.to_next)?, planes(motions.to_previous)?])
+pub(super) fn velocity_in(path: &Path, exr: &ExrImage, frames_per_second: f64) -> Result<FrameMotion> {
+    let motion = channels::motion_planes(path, exr)?;
+    if let Some((layer, _)) = channels::motion(exr) {
+        answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
+    }
+    Ok(motion)
 }
 
 pub(super) fn check_knows_motion(model: &dyn ThresholdModel) -> Result<()> {

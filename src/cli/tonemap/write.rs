@@ -4,7 +4,7 @@ use super::SceneFrame;
 use crate::cli::kept_tone::{LIGHT, OF_DISPLAY};
 use crate::cli::picture::note;
 use anyhow::{Context, Result};
-use fechner::output::{self, Attribute, Format, Picture, Shown, channel};
+use fechner::output::{self, Attribute, Format, Picture, Shown, attribute, channel};
 use fechner_perception::tone::{AdaptationState, FittedTone};
 use std::path::Path;
 
@@ -73,9 +73,9 @@ fn write_exr(
     picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(display.white_cd_m2 as f32));
     // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.
     let operator = fitted.describe().replace('²', "2").replace('×', "x");
-    picture.push_attribute("fechner.operator", Attribute::Text(operator));
+    picture.push_attribute(attribute::OPERATOR, Attribute::Text(operator));
     picture.push_attribute(LIGHT, Attribute::Text(OF_DISPLAY.to_owned()));
-    picture.push_attribute("fechner.observer.display", Attribute::Text(display.name.clone()));
+    picture.push_attribute(attribute::OBSERVER_DISPLAY, Attribute::Text(display.name.clone()));
     picture.push_attribute(output::PIXEL_ASPECT_RATIO, Attribute::Float(frame.pixel_aspect_ratio as f32));
     picture.attributes.extend(output::display_attribute(&frame.display));
     picture.attributes.extend(output::tone_attribute(fitted));

@@ -3,23 +3,16 @@
 use super::SurfaceGuides;
 use super::planes::{Beyond, PaddedPlane, TILE};
 use super::taps::{Tap, Taps};
-use fechner_perception::guide::depth_slopes;
+use fechner_perception::guide::{BEYOND, DEPTH_SLOPES, FARTHEST_SURFACE, GONE, depth_slopes};
 use fechner_perception::photometry::luminance;
 use rayon::prelude::*;
 
 /// A neighbour gets 1/e of the weight where the cosine between the normals is below 1 by one part in so many.
 const NORMAL_SHARPNESS: f32 = 12.0;
-/// A neighbour this many times farther off than the surface's slope explains gets 1/e of the weight.
-const DEPTH_SLOPES: f32 = 1.5;
-/// And so does one that is farther off by this share of the depth, where the surface has no slope.
+/// A neighbour that is farther off by this share of the depth gets 1/e of the weight where the surface has no slope.
 const DEPTH_SHARE: f32 = 2e-3;
-/// Depth beside the picture, so far from any other that what lies there never weighs anything; and half of it where there is no surface.
-const BEYOND: f32 = 1e30;
+/// Depth where there is no surface.
 const NO_SURFACE: f32 = 0.5 * BEYOND;
-/// Surfaces farther away than this are taken to be here.
-const FARTHEST_SURFACE: f32 = 1e14;
-/// From here on [`falling`] is 0.
-const GONE: f32 = 8.0;
 
 /// About exp(−x), 0 from [`GONE`] on, without the cost of an exponential.
 #[inline(always)]

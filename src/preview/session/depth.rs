@@ -27,7 +27,8 @@ impl Session<'_> {
         }
     }
 
-    /// Distance of what a pixel shows along the camera's axis, as focus and pivot count it, from whichever film has it; none where nothing is or the picture is of another camera.
+    /// Distance of what a pixel shows along the camera's axis, as focus and pivot count it, from whichever film has it; none where nothing is or the
+    /// picture is of another camera.
     fn depth_at(&self, x: usize, y: usize) -> Option<f32> {
         let in_film = |(film, step): (&Film, usize)| {
             let (column, row, width) = (x / step, y / step, film.width() as usize);

@@ -1,6 +1,7 @@
 //! Motion in the picture, for who looks at it: the scenes a frame before and after are read beside the render.
 
 use super::Session;
+use crate::animate::USUAL_FRAMES_PER_SECOND;
 use crate::animate::velocity::VelocityMap;
 use crate::preview::Host;
 use crate::preview::command::Command;
@@ -9,9 +10,6 @@ use crate::preview::screen::Motion;
 use crate::preview::shared::Shared;
 use crate::scene::Scene;
 use std::sync::{Arc, OnceLock};
-
-/// Frames a second that motion is told in: the cinema's.
-const FRAMES_PER_SECOND: f64 = 24.0;
 
 /// The scenes a frame before and a frame after, as soon as they are read.
 pub(super) struct Neighbours(Arc<OnceLock<Result<[Scene; 2], String>>>);
@@ -22,7 +20,7 @@ impl Neighbours {
         let slot = Arc::new(OnceLock::new());
         let (filled, host, shared) = (Arc::clone(&slot), Arc::clone(host), Arc::clone(shared));
         let read = move || {
-            let frame = 1.0 / FRAMES_PER_SECOND;
+            let frame = 1.0 / USUAL_FRAMES_PER_SECOND;
             let scenes = host.later(-frame).and_then(|before| Ok([before, host.later(frame)?]));
             // Nobody else fills it.
             let _ = filled.set(scenes);
@@ -57,7 +55,7 @@ impl Session<'_> {
                     [&self.held.camera; 3]
                 };
                 let VelocityMap { to_next, .. } = VelocityMap::seen_by(cameras, &self.tracer, before, after);
-                Motion::Known { to_next_px: to_next, frames_per_second: FRAMES_PER_SECOND }
+                Motion::Known { to_next_px: to_next, frames_per_second: USUAL_FRAMES_PER_SECOND }
             }
         };
     }

@@ -4,7 +4,6 @@ use crate::geometry::tree;
 use crate::scene::{Camera, Instance, Mesh, Sphere};
 use glam::{Affine3A, Vec3, Vec3A};
 
-const VERTICAL_FOV_DEG: f32 = 40.0;
 /// From the front (+z) towards +x, and above the horizon.
 const AZIMUTH_DEG: f32 = 35.0;
 const ELEVATION_DEG: f32 = 20.0;
@@ -89,7 +88,7 @@ pub fn framed(bounds: Bounds, aspect: f32) -> Camera {
     // Half the sum first, in case both are near the largest float.
     let center = 0.5 * bounds.min + 0.5 * bounds.max;
     let half = 0.5 * bounds.max - 0.5 * bounds.min;
-    let tan_vertical = (0.5 * VERTICAL_FOV_DEG).to_radians().tan() / (1.0 + MARGIN);
+    let tan_vertical = (0.5 * Camera::USUAL_FOV_DEG).to_radians().tan() / (1.0 + MARGIN);
     let tan_horizontal = tan_vertical * aspect;
     let mut distance: f32 = 0.0;
     for corner in 0..8 {
@@ -103,7 +102,7 @@ pub fn framed(bounds: Bounds, aspect: f32) -> Camera {
     let distance = if distance > 0.0 && distance.is_finite() { distance } else { 1.0 };
     Camera {
         focus_distance: distance,
-        ..Camera::pinhole(center - distance * forward, forward, Vec3::Y, VERTICAL_FOV_DEG)
+        ..Camera::pinhole(center - distance * forward, forward, Vec3::Y, Camera::USUAL_FOV_DEG)
     }
 }
 
@@ -128,7 +127,7 @@ mod tests {
             let camera = framed(bounds, aspect);
             let right = camera.forward.cross(camera.up).normalize();
             let up = right.cross(camera.forward);
-            let tan = (0.5 * VERTICAL_FOV_DEG).to_radians().tan();
+            let tan = (0.5 * Camera::USUAL_FOV_DEG).to_radians().tan();
             let mut widest: f32 = 0.0;
             for corner in bounds.corners() {
                 let point = Vec3::from(corner) - camera.position;

@@ -4,6 +4,7 @@ use super::error::LoadError;
 use crate::poison::Unpoisoned as _;
 use crate::read_file;
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -59,12 +60,17 @@ pub(crate) fn read_unpacked(path: &Path) -> Result<Vec<u8>, LoadError> {
     if !bytes.starts_with(&[0x1f, 0x8b]) {
         return Ok(bytes);
     }
+    unpacked(flate2::read::MultiGzDecoder::new(bytes.as_slice()), path, "not valid gzip")
+}
+
+/// What a decoder of a file, or of a part of it, gives; `damaged` says what it is where that cannot be unpacked.
+pub(crate) fn unpacked(decoder: impl Read, path: &Path, damaged: impl Display) -> Result<Vec<u8>, LoadError> {
     let mut unpacked = Vec::new();
-    // One more byte than allowed tells a file that ends there from one that goes on.
-    let mut limited = flate2::read::MultiGzDecoder::new(bytes.as_slice()).take(MOST_UNPACKED_BYTES + 1);
-    limited
+    // One more byte than allowed tells what ends there from what goes on.
+    decoder
+        .take(MOST_UNPACKED_BYTES + 1)
         .read_to_end(&mut unpacked)
-        .map_err(|error| LoadError::invalid(path, format_args!("not valid gzip: {error}")))?;
+        .map_err(|error| LoadError::invalid(path, format_args!("{damaged}: {error}")))?;
     if unpacked.len() as u64 > MOST_UNPACKED_BYTES {
         let problem = format!("unpacks to more than {} MiB", MOST_UNPACKED_BYTES >> 20);
         return Err(LoadError::too_large(path, problem));

@@ -267,8 +267,12 @@ impl Written {
         let factors = ["Kd", "Ks", "Ke", "Pr", "Pm", "Pc", "Pcr", "Ps"].into_iter();
         let idle: Vec<String> = factors.filter(is_idle).map(|key| format!("{key} 0")).collect();
         if !idle.is_empty() {
-            builder.note(format!("Material \"{}\": {} beside a picture is taken as 1.", self.name, idle.join(", ")));
+            self.note_zero_beside_map(builder, &idle.join(", "));
         }
+    }
+
+    fn note_zero_beside_map(&self, builder: &mut Builder, factor: &str) {
+        builder.note(format!("Material \"{}\": {factor} beside a picture is taken as 1.", self.name));
     }
 
     /// Names what was left out in one sentence.
@@ -331,11 +335,7 @@ impl Written {
         let factor = if opacity > 0.0 {
             opacity
         } else {
-            builder.note(format!(
-                "Material \"{}\": {} beside a picture is taken as 1.",
-                self.name,
-                self.transparency()
-            ));
+            self.note_zero_beside_map(builder, self.transparency());
             1.0
         };
         Alpha::Blend { value: ScalarInput { factor: factor * map.gain.max(0.0), texture: Some((lookup, channel)) } }

@@ -15,20 +15,28 @@ use super::within_rec709;
 use crate::scene::{Environment, Light};
 use glam::{Mat3, Vec3};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
+use std::ops::RangeInclusive;
 
 /// What a clear sky depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sky {
-    /// Height of the sun above the horizon in degrees, in [0, 90].
+    /// Height of the sun above the horizon in degrees, within [`Sky::ELEVATION_DEG`].
     pub sun_elevation_deg: f32,
     /// Direction of the sun in degrees from −z (ahead) towards +x (right).
     pub sun_azimuth_deg: f32,
-    /// Haze: 2 is very clear, 3 clear, 6 warm and moist, 10 hazy. In [2, 10].
+    /// Haze: 2 is very clear, 3 clear, 6 warm and moist, 10 hazy. Within [`Sky::TURBIDITY`].
     pub turbidity: f32,
     /// Reflectance of the ground below the horizon, in [0, 1].
     pub ground_albedo: f32,
     /// Whether the sun itself shines.
     pub sun: bool,
+}
+
+impl Sky {
+    /// Heights of the sun, degrees, that it can have.
+    pub const ELEVATION_DEG: RangeInclusive<f32> = 0.0..=90.0;
+    /// Turbidities that the fit of its luminance holds for.
+    pub const TURBIDITY: RangeInclusive<f32> = 2.0..=10.0;
 }
 
 impl Default for Sky {

@@ -17,7 +17,7 @@ impl Shot<'_> {
         let gaze_velocity_deg_s = follows_gaze.then(|| self.settings.gaze_velocity_deg_s(track.frame));
         let denoiser = settings.denoiser.as_ref().map(Denoiser::name);
         // What the frame's own scene holds is part of its track.
-        let parts: [(&str, &dyn Debug); 16] = [
+        let parts: [(&str, &dyn Debug); 17] = [
             ("program", &PROGRAM),
             ("format", &self.format),
             ("track", track),
@@ -29,6 +29,8 @@ impl Shot<'_> {
             ("limits", &settings.limits),
             ("viewing", &settings.viewing),
             ("timing", &settings.frames),
+            // What a picture says of itself, even where no eye sees frames follow one another.
+            ("rate", &self.settings.frames_per_second),
             ("gazes", &settings.gazes),
             ("names of channels", &self.arguments.aov_names),
             ("velocity", &self.settings.velocity_of),

@@ -7,7 +7,7 @@ use super::buffers::{Buffers, Uri, resolve};
 use super::extension::{ANISOTROPY, CLEARCOAT, Extension, SHEEN, name_of, share};
 use crate::scene::{
     Alpha, CoatRelief, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Relief, ScalarInput,
-    StretchDirection, Surface, TextureLookup, Wrap,
+    StretchDirection, Surface, TextureLookup, USUAL_IOR, Wrap,
 };
 use glam::{Vec2, Vec3};
 use gltf::material::AlphaMode;
@@ -345,16 +345,15 @@ fn absorption(volume: &gltf::material::Volume) -> Vec3 {
     if distance.is_finite() && distance > 0.0 { Surface::absorption_of(left, distance) } else { Vec3::ZERO }
 }
 
-/// What is told where it can be used, else 1.5.
+/// What is told where it can be used, else the usual one.
 fn index_of_refraction(builder: &mut Builder, from: &gltf::Material, name: &str) -> f32 {
-    const USUAL: f32 = 1.5;
     let has_volume = from.volume().is_some_and(|volume| volume.thickness_factor() > 0.0);
-    let Some(ior) = from.ior() else { return USUAL };
+    let Some(ior) = from.ior() else { return USUAL_IOR };
     match MetalRoughness::problem_with_ior(ior, has_volume) {
         None => ior,
         Some(problem) => {
-            builder.note(format!("\"{name}\": ior {ior} is taken as {USUAL}: {problem}."));
-            USUAL
+            builder.note(format!("\"{name}\": ior {ior} is taken as {USUAL_IOR}: {problem}."));
+            USUAL_IOR
         }
     }
 }

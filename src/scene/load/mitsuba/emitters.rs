@@ -132,7 +132,7 @@ impl Reader {
         let day = Sky {
             sun_elevation_deg: elevation,
             sun_azimuth_deg: towards_sun.x.atan2(-towards_sun.z).to_degrees(),
-            turbidity: turbidity.clamp(2.0, 10.0),
+            turbidity: turbidity.clamp(*Sky::TURBIDITY.start(), *Sky::TURBIDITY.end()),
             ground_albedo: super::super::luminance(albedo).clamp(0.0, 1.0),
             sun: kind != "sky",
         };

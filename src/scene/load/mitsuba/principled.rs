@@ -54,7 +54,8 @@ impl Reader {
     fn glass(&mut self, bsdf: &Element, model: MetalRoughness) -> Surface {
         let Some(amount) = share_of_glass(model.transmission, model.metallic) else {
             self.builder.note(format!(
-                "{}: where \"metallic\" is a picture, or \"spec_trans\" one that is multiplied by more than 1, what \"spec_trans\" lets through is tinted at each crossing by all of \
+                "{}: where \"metallic\" is a picture, or \"spec_trans\" one that is multiplied by more than 1, what \
+                 \"spec_trans\" lets through is tinted at each crossing by all of \
                  \"base_color\", not by its square root.",
                 bsdf.place()
             ));

@@ -4,13 +4,10 @@ use super::super::error::LoadError;
 use super::super::files;
 use crate::scene::Mesh;
 use glam::{Vec2, Vec3};
-use std::io::Read;
 use std::path::Path;
 
 /// First two bytes of every stream's header.
 const MAGIC: u16 = 0x041C;
-/// Most bytes that a stream may unpack to.
-const MOST_UNPACKED_BYTES: u64 = 2 << 30;
 
 /// Flags of a mesh.
 const HAS_NORMALS: u32 = 0x0001;
@@ -44,11 +41,8 @@ pub(super) fn read(path: &Path, number: usize) -> Result<Mesh, LoadError> {
     let entry = &bytes[table + number * width..table + (number + 1) * width];
     let offset = entry.iter().rev().fold(0_u64, |offset, &byte| offset << 8 | u64::from(byte));
     let stream = usize::try_from(offset).ok().and_then(|at| bytes.get(at.checked_add(4)?..)).ok_or_else(cut)?;
-    let mut unpacked = Vec::new();
-    flate2::read::ZlibDecoder::new(stream)
-        .take(MOST_UNPACKED_BYTES)
-        .read_to_end(&mut unpacked)
-        .map_err(|error| LoadError::invalid(path, format_args!("mesh {number} is not valid zlib: {error}")))?;
+    let damaged = format_args!("mesh {number} is not valid zlib");
+    let unpacked = files::unpacked(flate2::read::ZlibDecoder::new(stream), path, damaged)?;
     parse(&unpacked, version)
         .ok_or_else(|| LoadError::invalid(path, format_args!("mesh {number} is cut off or damaged")))
 }

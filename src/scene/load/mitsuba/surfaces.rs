@@ -7,7 +7,7 @@ use super::Reader;
 use super::element::Element;
 use super::principled::Body;
 use super::textures::Meaning;
-use crate::scene::{ColorInput, Distribution, Roughness, RoughnessScale, ScalarInput, Surface};
+use crate::scene::{ColorInput, Distribution, Roughness, RoughnessScale, ScalarInput, Surface, USUAL_IOR};
 use glam::Vec3;
 
 /// Indices of refraction by name, at the yellow sodium line.
@@ -120,7 +120,7 @@ impl Reader {
         let alpha = (2.0 / (exponent + 2.0)).sqrt();
         Ok(Surface::CoatedDiffuse {
             reflectance: self.reflectance(bsdf, "diffusereflectance", 0.5)?,
-            ior: 1.5,
+            ior: USUAL_IOR,
             roughness: Roughness { scale: RoughnessScale::Alpha, ..Roughness::constant(alpha.min(1.0)) },
             saturates: false,
         })
@@ -218,7 +218,7 @@ fn grooves(alpha: ScalarInput) -> ScalarInput {
 /// An index of refraction: a number or a material's name.
 fn index(bsdf: &Element, name: &str, default: &str) -> Result<f32, LoadError> {
     let known = |name: &str| INDICES.iter().find(|(known, _)| *known == name).map(|&(_, index)| index);
-    let Some(child) = bsdf.child(name) else { return Ok(known(default).unwrap_or(1.5)) };
+    let Some(child) = bsdf.child(name) else { return Ok(known(default).unwrap_or(USUAL_IOR)) };
     let text = child.attribute("value").unwrap_or("");
     let index = match (child.tag.as_str(), known(&text.to_lowercase())) {
         ("string", Some(index)) => index,

@@ -2,7 +2,9 @@
 
 use super::super::builder::Builder;
 use super::{DEFAULT_KD, Written};
-use crate::scene::{ColorInput, Encoding, MetalRoughness, Roughness, ScalarInput, StretchDirection, Surface};
+use crate::scene::{
+    ColorInput, Encoding, MetalRoughness, Roughness, ScalarInput, StretchDirection, Surface, USUAL_IOR,
+};
 use glam::Vec3;
 
 /// Diffuse colours up to this do not keep glass from being glass: exporters write 0.01 for black.
@@ -136,7 +138,7 @@ impl Written {
         }
         let tint = filter.filter(|tint| tint.max_element() > 0.0).unwrap_or(Vec3::ONE).min(Vec3::ONE);
         Some(Surface::Dielectric {
-            ior: self.number("ni").filter(|&ior| ior > 1.0).unwrap_or(1.5),
+            ior: self.number("ni").filter(|&ior| ior > 1.0).unwrap_or(USUAL_IOR),
             roughness: Roughness::constant(self.number("pr").unwrap_or(0.0).clamp(0.0, 1.0)),
             transmittance: ColorInput::constant(tint),
             absorption: Vec3::ZERO,
@@ -166,7 +168,7 @@ impl Written {
             base_color: self.share_input(builder, "kd"),
             metallic: self.scalar_input(builder, "pm", 0.0),
             roughness: self.scalar_input(builder, "pr", roughness),
-            ior: self.number("ni").filter(|&ior| ior > 1.0).unwrap_or(1.5),
+            ior: self.number("ni").filter(|&ior| ior > 1.0).unwrap_or(USUAL_IOR),
             specular,
             specular_color,
             anisotropy: ScalarInput::constant(self.number("aniso").unwrap_or(0.0).clamp(0.0, 1.0)),

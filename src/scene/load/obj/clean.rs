@@ -1,5 +1,7 @@
 //! The text of an OBJ file as `tobj` can read it.
 
+use std::borrow::Cow;
+
 /// An OBJ file's text as `tobj` can read it.
 pub(super) struct Cleaned {
     pub(super) text: String,
@@ -16,10 +18,11 @@ pub(super) enum VertexColors {
     All,
 }
 
-/// The text with continued lines joined (blank lines keep the count), comments behind numbers and opacities behind colours cut off,
+/// The text with spaces for tabs, continued lines joined (blank lines keep the count), comments behind numbers and opacities behind colours cut off,
 /// a 0 behind texture coordinates of one number, and empty `usemtl` statements left out: all of these stop `tobj`. Points and lines
 /// are left out too: `tobj` takes a line for a face, and one without texture coordinates would take them from its whole object.
 pub(super) fn clean(text: &str) -> Cleaned {
+    let text = &*with_spaces_for_tabs(text);
     let is_vertex = |line: &&str| line.starts_with("v ");
     // Three numbers more than a position has, and perhaps an opacity.
     let has_color = |line: &&str| matches!(line.split('#').next().unwrap_or(line).split_whitespace().count(), 7 | 8);
@@ -57,10 +60,7 @@ pub(super) fn clean(text: &str) -> Cleaned {
             _ if words == 8 => before_word(part, 7),
             _ => part,
         };
-        match part.split_once('\t') {
-            Some(_) => cleaned.extend(part.chars().map(|c| if c == '\t' { ' ' } else { c })),
-            None => cleaned.push_str(if is_start && part.trim() == "usemtl" { "" } else { part }),
-        }
+        cleaned.push_str(if is_start && part.trim() == "usemtl" { "" } else { part });
         if is_start && continued.is_none() && part.starts_with("vt ") && part.split_whitespace().count() == 2 {
             cleaned.push_str(" 0");
         }
@@ -73,6 +73,10 @@ pub(super) fn clean(text: &str) -> Cleaned {
         }
     }
     Cleaned { text: cleaned, colors, points_and_lines }
+}
+
+fn with_spaces_for_tabs(text: &str) -> Cow<'_, str> {
+    if text.contains('\t') { Cow::Owned(text.replace('\t', " ")) } else { Cow::Borrowed(text) }
 }
 
 /// The text with empty lines for those that part its faces.
@@ -116,6 +120,21 @@ mod tests {
     fn numbers_that_tobj_does_not_expect_are_mended() {
         let text = clean("v 1 2 3 0.5 0.5 0.5 1\nvt 0.5 # u\nvt 0 1\n").text;
         assert_eq!(text, "v 1 2 3 0.5 0.5 0.5 \nvt 0.5  0\nvt 0 1\n");
+    }
+
+    /// "v" and "vt" were known by the space behind them alone: such files were refused, or lost their colours without a word.
+    #[test]
+    fn tabs_part_words_as_spaces_do() {
+        for spaced in [
+            "v 1 2 3 0.5 0.5 0.5 1\n",
+            "v 1 2 3 0.5 0.5 0.5\n",
+            "v 1 2 3 0.5 0.5 0.5\nv 1 2 3\n",
+            "vt 0.5\n",
+            "usemtl \n",
+        ] {
+            let (tabbed, spaced) = (clean(&spaced.replace(' ', "\t")), clean(spaced));
+            assert_eq!((tabbed.text, tabbed.colors), (spaced.text, spaced.colors));
+        }
     }
 
     #[test]

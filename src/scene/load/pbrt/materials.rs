@@ -9,7 +9,7 @@ use super::inputs::Meaning;
 use super::parameters::Parameters;
 use crate::scene::{
     ColorInput, Distribution, Encoding, HeightMap, HeightUnit, Material, Relief, Roughness, RoughnessScale,
-    ScalarInput, Surface, Wrap,
+    ScalarInput, Surface, USUAL_IOR, Wrap,
 };
 use glam::Vec3;
 use std::rc::Rc;
@@ -151,7 +151,7 @@ impl Reader<'_> {
 
     fn coated_diffuse(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
         self.note_coat(parameters);
-        self.under_coat(parameters, 1.5)
+        self.under_coat(parameters, USUAL_IOR)
     }
 
     fn subsurface(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
@@ -179,14 +179,14 @@ impl Reader<'_> {
             eta,
             k,
             roughness: self.roughness(parameters, "conductor.")?,
-            coat_ior: self.ior(parameters, "interface.eta", 1.5)?.max(1.0),
+            coat_ior: self.ior(parameters, "interface.eta", USUAL_IOR)?.max(1.0),
             coat_roughness: self.roughness(parameters, "interface.")?,
         })
     }
 
     fn dielectric(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
         Ok(Surface::Dielectric {
-            ior: self.ior(parameters, "eta", 1.5)?,
+            ior: self.ior(parameters, "eta", USUAL_IOR)?,
             roughness: self.roughness(parameters, "")?,
             transmittance: ColorInput::constant(Vec3::ONE),
             absorption: Vec3::ZERO,
@@ -195,7 +195,7 @@ impl Reader<'_> {
 
     fn thin_dielectric(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
         Ok(Surface::ThinDielectric {
-            ior: self.ior(parameters, "eta", 1.5)?,
+            ior: self.ior(parameters, "eta", USUAL_IOR)?,
             transmittance: ColorInput::constant(Vec3::ONE),
         })
     }

@@ -25,6 +25,11 @@ impl<'a> Values<'a> {
         LoadError::invalid_at(Place { file: self.path.to_owned(), line }, problem)
     }
 
+    /// That of a number among indices that is none.
+    pub(super) fn no_index(&self, number: impl std::fmt::Display) -> LoadError {
+        self.error(format_args!("{number} is not a vertex index"))
+    }
+
     pub(super) fn bytes_left(&self) -> usize {
         self.bytes.len() - self.at
     }
@@ -140,16 +145,21 @@ impl<'a> Values<'a> {
         if self.encoding != Encoding::Ascii && matches!(kind, Kind::I32 | Kind::U32) {
             let encoding = self.encoding;
             let bytes = self.take(size * 4)?;
+            let first = indices.len();
             indices.extend(bytes.as_chunks::<4>().0.iter().map(|&four| match encoding {
                 Encoding::BigEndian => u32::from_be_bytes(four),
                 _ => u32::from_le_bytes(four),
             }));
-            return Ok(size as u32);
+            let mut signed = indices[first..].iter().map(|&index| index as i32);
+            return match signed.find(|&index| kind == Kind::I32 && index < 0) {
+                Some(index) => Err(self.no_index(index)),
+                None => Ok(size as u32),
+            };
         }
         for _ in 0..size {
             let index = self.number(kind)?;
             if index.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&index) {
-                return Err(self.error(format_args!("{index} is not a vertex index")));
+                return Err(self.no_index(index));
             }
             indices.push(index as u32);
         }

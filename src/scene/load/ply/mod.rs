@@ -241,6 +241,21 @@ mod tests {
     }
 
     #[test]
+    fn indices_below_0_are_told_as_they_stand() {
+        let text = String::from_utf8(ascii()).unwrap().replace("3 0 2 3", "3 0 2 -1").into_bytes();
+        let [little, big] = [false, true].map(|big| {
+            let mut bytes = binary(big);
+            let last = bytes.len() - 4;
+            bytes[last..].fill(0xff);
+            bytes
+        });
+        for bytes in [text, little, big] {
+            let error = load(&bytes).map(|_| ()).expect_err("no index").to_string();
+            assert!(error.contains("-1 is not a vertex index"), "{error}");
+        }
+    }
+
+    #[test]
     fn strips_are_triangles() {
         let text = String::from_utf8(ascii())
             .unwrap()

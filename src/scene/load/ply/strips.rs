@@ -23,7 +23,7 @@ pub(super) fn read<'h>(
                     for _ in 0..values.list_size(count, property.kind)? {
                         let index = values.number(property.kind)?;
                         if index.fract() != 0.0 || index > f64::from(u32::MAX) {
-                            return Err(values.error(format_args!("{index} is not a vertex index")));
+                            return Err(values.no_index(index));
                         }
                         if index >= 0.0 {
                             strip.push(index as u32);

@@ -6,12 +6,13 @@ use crate::exr_read::layers::colour_layer;
 use crate::exr_read::{self, ExrImage, Replaced, Window, layer_and_part};
 use crate::hdr_read::{self, HdrHeader, with_known_header};
 use crate::jpeg_read;
+use crate::read_file;
 use crate::scene::load::{LoadError, files};
 use crate::scene::{Encoding, Texels};
 use fechner_perception::eotf::srgb_to_linear;
 use fechner_perception::tone::gamut;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
-use std::io::Cursor;
+use std::io::{BufReader, Cursor};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -89,7 +90,12 @@ pub(in crate::scene::load) fn is_grey(path: &Path) -> bool {
 }
 
 fn color_type(path: &Path) -> Option<image::ColorType> {
-    Some(ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_decoder().ok()?.color_type())
+    let mut reader = ImageReader::new(BufReader::new(read_file::open(path).ok()?));
+    // Where its bytes do not say what it is, as those of TGA, its name does.
+    if let Ok(format) = ImageFormat::from_path(path) {
+        reader.set_format(format);
+    }
+    Some(reader.with_guessed_format().ok()?.into_decoder().ok()?.color_type())
 }
 
 /// Decodes one picture.

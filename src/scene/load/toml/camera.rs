@@ -57,7 +57,10 @@ fn projection(fields: &Fields) -> Result<Projection, LoadError> {
     let angle = fields.get("vertical_fov_deg");
     let Some(height) = fields.get("orthographic_height") else {
         let (least, most) = Camera::FOV_DEG.into_inner();
-        let vertical_fov_deg = angle.map_or(Ok(40.0), |angle| angle.within(least, most))? as f32;
+        let vertical_fov_deg = match angle {
+            Some(angle) => angle.within(least, most)? as f32,
+            None => Camera::USUAL_FOV_DEG,
+        };
         return Ok(Projection::Perspective { vertical_fov_deg });
     };
     match angle {

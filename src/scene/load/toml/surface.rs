@@ -6,7 +6,7 @@ use super::Context;
 use super::fields::{Fields, Value};
 use super::material::{Entry, Materials, scalar, share, share_or_white};
 use crate::scene::{
-    Alpha, CoatRelief, ColorInput, Distribution, Material, MetalRoughness, Roughness, ScalarInput, Surface,
+    Alpha, CoatRelief, ColorInput, Distribution, Material, MetalRoughness, Roughness, ScalarInput, Surface, USUAL_IOR,
 };
 use glam::Vec3;
 
@@ -163,7 +163,7 @@ fn conductor<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'
 
 fn dielectric<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
     Ok(Surface::Dielectric {
-        ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
+        ior: fields.get_or("ior", f64::from(USUAL_IOR), Value::positive)? as f32,
         roughness: roughness(context, fields, ROUGHNESS_KEYS)?,
         transmittance: share_or_white(context, fields, "transmittance")?,
         absorption: absorption(fields)?,
@@ -194,14 +194,14 @@ fn thin_dielectric<'a>(
     fields: &Fields<'a>,
 ) -> Result<Surface, LoadError> {
     Ok(Surface::ThinDielectric {
-        ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
+        ior: fields.get_or("ior", f64::from(USUAL_IOR), Value::positive)? as f32,
         transmittance: share_or_white(context, fields, "transmittance")?,
     })
 }
 
 /// An index of refraction of a coat, which lies in air.
 fn coat_ior(fields: &Fields<'_>, key: &str) -> Result<f32, LoadError> {
-    fields.get_or(key, 1.5, |value| value.within(1.0, 10.0)).map(|ior| ior as f32)
+    fields.get_or(key, f64::from(USUAL_IOR), |value| value.within(1.0, 10.0)).map(|ior| ior as f32)
 }
 
 fn coated_diffuse<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
@@ -241,7 +241,7 @@ fn metal_roughness<'a>(
         base_color: share_or_white(context, fields, "base_color")?,
         metallic: scalar(context, fields, "metallic", 0.0)?,
         roughness: scalar(context, fields, "roughness", 0.5)?,
-        ior: fields.get_or("ior", 1.5, |value| {
+        ior: fields.get_or("ior", USUAL_IOR, |value| {
             let ior = value.number()? as f32;
             MetalRoughness::problem_with_ior(ior, volume.is_some())
                 .map_or(Ok(ior), |problem| Err(value.error(format_args!("{problem}, not {ior}"))))

@@ -6,6 +6,7 @@ use crate::scene::load::sky::{self, Sky};
 use crate::scene::load::{LoadError, environment};
 use crate::scene::{Environment, Light, Parametrisation};
 use glam::{Mat3, Vec3};
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 /// What surrounds the scene, and the sun if there is one.
@@ -67,14 +68,16 @@ pub(super) fn read(
 fn read_sky(value: &Value) -> Result<Sky, LoadError> {
     let fields = value.fields(&["sun_elevation_deg", "sun_azimuth_deg", "turbidity", "ground_albedo", "sun"])?;
     let default = Sky::default();
-    let number = |key, default: f32, low, high| {
-        fields.get_or(key, f64::from(default), |value| value.within(low, high)).map(|number| number as f32)
+    let number = |key, default: f32, range: RangeInclusive<f32>| {
+        let (low, high) = range.into_inner();
+        let within = |value: &Value| value.within(f64::from(low), f64::from(high));
+        fields.get_or(key, f64::from(default), within).map(|number| number as f32)
     };
     Ok(Sky {
-        sun_elevation_deg: number("sun_elevation_deg", default.sun_elevation_deg, 0.0, 90.0)?,
+        sun_elevation_deg: number("sun_elevation_deg", default.sun_elevation_deg, Sky::ELEVATION_DEG)?,
         sun_azimuth_deg: fields.get_or("sun_azimuth_deg", f64::from(default.sun_azimuth_deg), Value::number)? as f32,
-        turbidity: number("turbidity", default.turbidity, 2.0, 10.0)?,
-        ground_albedo: number("ground_albedo", default.ground_albedo, 0.0, 1.0)?,
+        turbidity: number("turbidity", default.turbidity, Sky::TURBIDITY)?,
+        ground_albedo: number("ground_albedo", default.ground_albedo, 0.0..=1.0)?,
         sun: fields.get_or("sun", default.sun, Value::boolean)?,
     })
 }
