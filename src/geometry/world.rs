@@ -13,7 +13,7 @@ use super::tree::{BinaryTree, Bounds};
 use super::wide_tree::TriangleRef;
 use super::{Coverage, Ray, sphere};
 use crate::sampler::{hash_words, unit_of_hash};
-use crate::scene::{Alpha, Instance, MaterialId, ScalarInput, Scene, SpherePlace};
+use crate::scene::{Alpha, Instance, Material, MaterialId, ScalarInput, Scene, SpherePlace};
 use at_hit::{Placement, interpolate_uv};
 use build::{Around, MOST_VERTICES, fixed_triangles, own_triangles, placed_bounds, swept_bounds};
 use glam::{Affine3A, Vec2, Vec3, Vec3A};
@@ -129,13 +129,18 @@ impl World {
         self.fixed.bytes() + self.shared.iter().map(MeshTree::bytes).sum::<usize>()
     }
 
-    /// The material of an object.
+    /// The number of the material of an object.
     pub fn material_of(&self, object: u32) -> MaterialId {
         let instances = self.scene.instances.len();
         match self.scene.instances.get(object as usize) {
             Some(instance) => instance.material,
             None => self.scene.spheres[object as usize - instances].material,
         }
+    }
+
+    /// What an object is made of.
+    pub fn material(&self, object: u32) -> &Material {
+        &self.scene.materials[self.material_of(object).0 as usize]
     }
 
     /// The closest surface along the ray.
@@ -292,7 +297,7 @@ impl World {
 
     fn covers(&self, part: Part, ray: &Ray, uv: impl Fn() -> Vec2) -> bool {
         let coverage = |value: &ScalarInput| value.evaluate(&self.scene.textures, uv());
-        match &self.scene.materials[self.material_of(part.object).0 as usize].alpha {
+        match &self.material(part.object).alpha {
             Alpha::Opaque => true,
             Alpha::Unseen => false,
             Alpha::Mask { value, cutoff } => coverage(value) >= *cutoff,

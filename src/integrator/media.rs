@@ -114,7 +114,7 @@ impl Media {
             let point = world.surface(&ray, &hit);
             let material = world.material_of(hit.object);
             let direction = Vec3::from(ray.direction);
-            if let Some(medium) = Medium::behind(material, &world.scene().materials[material.0 as usize].surface) {
+            if let Some(medium) = Medium::behind(material, &world.material(hit.object).surface) {
                 if direction.dot(point.geometric_normal) < 0.0 {
                     entered.push(material);
                 } else if let Some(place) = entered.iter().rposition(|own| *own == material) {

@@ -214,7 +214,7 @@ impl PathTracer {
     /// Radiance emitted by the surface that was hit; whether there was any.
     fn add_emission(&self, path: &mut PathState, hit: &Hit, point: &SurfacePoint) -> bool {
         let scene = self.world.scene();
-        let material = &scene.materials[self.world.material_of(hit.object).0 as usize];
+        let material = self.world.material(hit.object);
         let cosine = -Vec3::from(path.ray.direction).dot(point.geometric_normal);
         if material.emission.factor == Vec3::ZERO || !(cosine > 0.0 || material.emits_both_sides) {
             return false;

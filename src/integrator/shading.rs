@@ -12,7 +12,7 @@ use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
 use crate::light::LightReceiver;
 use crate::scene::{
-    CoatRelief, ColorInput, Material, MaterialId, MetalRoughness, Relief, Roughness, ScalarInput, Surface, Texture,
+    CoatRelief, ColorInput, Material, MetalRoughness, Relief, Roughness, ScalarInput, Surface, Texture,
 };
 use glam::{Mat3, Vec2, Vec3};
 use std::cell::{Cell, OnceCell};
@@ -233,7 +233,7 @@ impl PathTracer {
     #[inline(always)]
     pub(super) fn frames(&self, point: &SurfacePoint, wo: Vec3, time: f32) -> Frames {
         let scene = self.world.scene();
-        let material = &scene.materials[self.world.material_of(point.object).0 as usize];
+        let material = self.world.material(point.object);
         let normal_under = |relief: Option<&Relief>| {
             let normal =
                 seen_side(relief::shading_normal(&self.world, relief, point, time), point.geometric_normal, wo);
@@ -259,29 +259,28 @@ impl PathTracer {
         components: &'a Components<'a>,
     ) -> Bsdf<'a> {
         let scene = self.world.scene();
-        let material_id = self.world.material_of(point.object).0 as usize;
+        let material = self.world.material_of(point.object).0 as usize;
         let reader = Reader {
             textures: &scene.textures,
             uv: point.uv,
             vertex_color: point.color,
             beneath_coat: frames.beneath_coat,
         };
-        reader.bsdf(&scene.materials[material_id].surface, &self.surface_tables[material_id], components)
+        reader.bsdf(&scene.materials[material].surface, &self.surface_tables[material], components)
     }
 
     /// What a point with such a BSDF in such frames does to light.
     #[inline(always)]
     pub(super) fn shading<'a>(&self, bsdf: &'a Bsdf<'a>, point: &SurfacePoint, frames: &Frames) -> Shading<'a> {
-        let scene = self.world.scene();
-        let material_id = self.world.material_of(point.object).0 as usize;
-        let material = &scene.materials[material_id];
+        let surface = &self.world.material(point.object).surface;
+        let medium = || Medium::behind(self.world.material_of(point.object), surface);
         Shading {
             bsdf,
             frame: frames.frame,
             normal: frames.normal,
             geometric_normal: point.geometric_normal,
-            transmits: material.surface.transmits(),
-            medium: if self.absorbs { Medium::behind(MaterialId(material_id as u32), &material.surface) } else { None },
+            transmits: surface.transmits(),
+            medium: if self.absorbs { medium() } else { None },
         }
     }
 }

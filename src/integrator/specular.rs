@@ -82,7 +82,7 @@ impl PathTracer {
     /// What the surface at a hit does with a ray if it is perfectly smooth and does not shine: the event that is asked for, or
     /// the likelier one.
     fn specular_event(&self, ray: &Ray, hit: &Hit, wanted: Option<SpecularEvent>) -> Option<(SpecularEvent, Ray)> {
-        let material = &self.world.scene().materials[self.world.material_of(hit.object).0 as usize];
+        let material = self.world.material(hit.object);
         if !may_be_specular(&material.surface) || material.emission.factor != Vec3::ZERO {
             return None;
         }

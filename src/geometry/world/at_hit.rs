@@ -140,7 +140,7 @@ impl World {
         let normal_a = ((ray.origin + ray.direction * hit.distance) - place.center).normalize_or(Vec3A::Y);
         let normal = Vec3::from(normal_a);
         let position = Vec3::from(place.center) + place.radius * normal;
-        let needs_tangent = self.scene.materials[self.material_of(hit.object).0 as usize].needs_tangent();
+        let needs_tangent = self.material(hit.object).needs_tangent();
         // −1 where the sphere is mirrored.
         let flip = place.axes.determinant().signum();
         let along_u = || flip * place.axes.y_axis.cross(normal_a).normalize_or(place.axes.x_axis);
