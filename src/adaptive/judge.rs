@@ -333,27 +333,27 @@ impl Judgement {
 
 /// Luminance of a half, cd/m²; of the other one where it has no samples.
 pub(super) fn half_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
-    let width = film.width() as usize;
-    Plane::from_fn(width, film.height() as usize, |x, y| {
-        (nits_per_unit * film.halves(y * width + x).half_or_other(half).luminance()) as f32
-    })
+    film.plane(|pixel| (nits_per_unit * film.halves(pixel).half_or_other(half).luminance()) as f32)
 }
 
 /// The denoised picture, cd/m²: what adaptation, masking and the operator are made from, so that noise neither
 /// masks itself nor raises its own adaptation. Never output.
 pub(crate) fn guide_rgb(film: &Film, estimate: &Estimate) -> Vec<[f32; 3]> {
-    let (width, height) = (film.width() as usize, film.height() as usize);
-    let albedo: Vec<_> = film.guides().iter().map(|g| g.albedo).collect();
-    let normal: Vec<_> = film.guides().iter().map(|g| g.normal).collect();
-    let depth: Vec<_> = film.guides().iter().map(|g| g.depth).collect();
+    let albedo: Vec<_> = film.guides().iter().map(|guide| guide.albedo).collect();
+    without_noise(film, &estimate.rgb_cd_m2, &estimate.variance_of_mean, &albedo)
+}
+
+/// A picture of what the film's first surfaces show, without its noise. `albedo`: what to divide by before.
+fn without_noise(film: &Film, rgb: &[[f32; 3]], variance: &Plane, albedo: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let guides = film.guides();
     denoise(&GuideInputs {
-        rgb: &estimate.rgb_cd_m2,
-        variance: &estimate.variance_of_mean,
-        albedo: &albedo,
-        normal: &normal,
-        depth: &depth,
-        width,
-        height,
+        rgb,
+        variance,
+        albedo,
+        normal: &guides.iter().map(|guide| guide.normal).collect::<Vec<_>>(),
+        depth: &guides.iter().map(|guide| guide.depth).collect::<Vec<_>>(),
+        width: film.width() as usize,
+        height: film.height() as usize,
     })
 }
 

@@ -64,13 +64,15 @@ const VARIANCE_OF_A_LONE_SAMPLE: f32 = 0.125;
 
 /// What the denoiser is told of the variance of the picture, (cd/m²)².
 fn told_variance(film: &Film, estimate: &Estimate) -> Plane {
-    Plane::from_fn(film.width() as usize, film.height() as usize, |x, y| {
-        let own = estimate.variance_of_mean.get(x, y);
-        match film.halves(y * film.width() as usize + x) {
+    let [own, half_difference, luminance] =
+        [&estimate.variance_of_mean, &estimate.half_difference, &estimate.luminance_cd_m2].map(Plane::values);
+    film.plane(|pixel| {
+        let own = own[pixel];
+        match film.halves(pixel) {
             // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ by.
-            Halves::Both(_) => 0.5 * (own + estimate.half_difference.get(x, y).powi(2)),
+            Halves::Both(_) => 0.5 * (own + half_difference[pixel].powi(2)),
             Halves::Only(only) if only.samples > 1 => own,
-            Halves::Only(_) => VARIANCE_OF_A_LONE_SAMPLE * estimate.luminance_cd_m2.get(x, y).powi(2),
+            Halves::Only(_) => VARIANCE_OF_A_LONE_SAMPLE * luminance[pixel].powi(2),
         }
     })
 }

@@ -19,6 +19,7 @@ pub use known_lamps::KnownLamps;
 
 use crate::integrator::BlockWork;
 use crate::sampler::Half;
+use fechner_perception::Plane;
 use fechner_perception::opponent::OPPONENT_OF_RGB;
 use serde::{Deserialize, Serialize};
 
@@ -135,6 +136,12 @@ impl Film {
     /// Its pixels.
     pub fn pixel_count(&self) -> usize {
         self.guides.len()
+    }
+
+    /// A value of each pixel, asked for by its number, rows in parallel.
+    pub(crate) fn plane(&self, of: impl Fn(usize) -> f32 + Sync) -> Plane {
+        let width = self.width as usize;
+        Plane::from_fn(width, self.height as usize, |x, y| of(y * width + x))
     }
 
     /// One half, row-major.
