@@ -39,6 +39,7 @@ mod mirror;
 mod mix;
 mod oren_nayar;
 mod phong;
+mod sheen;
 #[cfg(test)]
 mod tests;
 mod thin_dielectric;
