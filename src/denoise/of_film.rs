@@ -128,29 +128,20 @@ fn mean_cd_m2(pixel: &HalfPixel, nits_per_unit: f64) -> [f32; 3] {
 mod tests {
     use super::*;
     use crate::denoise::DenoiserKind;
-    use crate::film::BlockSum;
+    use crate::film::{BlockSum, film_of_samples};
     use crate::integrator::{BlockWork, FirstHit, PathSample};
     use crate::sampler::{hash_words, unit_of_hash};
 
     const SIDE: u32 = 48;
 
-    /// A film of so many samples in each half of a pixel, which are made of the pixel, the half and the sample's number.
-    fn film_of(samples: u32, mut sample: impl FnMut(u32, Half, u32) -> PathSample) -> Film {
-        let mut film = Film::new(SIDE, SIDE);
-        for pixel in 0..SIDE * SIDE {
-            for half in Half::BOTH {
-                let mut sum = BlockSum::default();
-                (0..samples).for_each(|index| sum.add(&sample(pixel, half, index)));
-                film.merge_block(BlockWork { half, ..BlockWork::whole(pixel, half, 0) }, &sum);
-            }
-        }
-        film
+    /// A film of so many samples in each half of every pixel.
+    fn film_of(samples: u32, sample: impl FnMut(u32, Half, u32) -> PathSample) -> Film {
+        film_of_samples([SIDE; 2], [samples; 2], sample)
     }
 
     /// A sample that met a wall.
     fn of_wall(albedo: Vec3, radiance: Vec3) -> PathSample {
-        let first_hit = FirstHit { albedo, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
-        PathSample { radiance, first_hit, rays: 1 }
+        PathSample { radiance, first_hit: FirstHit { albedo, ..FirstHit::WALL }, rays: 1 }
     }
 
     /// A wall of radiance 1 with noise, and before it a lamp two pixels wide that is 10000 times as bright, whose edges cover pixels

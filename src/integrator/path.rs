@@ -31,6 +31,10 @@ pub struct FirstHit {
 impl FirstHit {
     /// No surface.
     pub const NOTHING: Self = Self { albedo: Vec3::ONE, normal: Vec3::ZERO, depth: 0.0, object_id: 0, shines: false };
+
+    /// A white wall that faces the camera, for films that tests make up.
+    #[cfg(test)]
+    pub(crate) const WALL: Self = Self { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
 }
 
 /// What a sample found.
@@ -42,6 +46,14 @@ pub struct PathSample {
     pub first_hit: FirstHit,
     /// Rays traced: camera, bounce and shadow.
     pub rays: u32,
+}
+
+#[cfg(test)]
+impl PathSample {
+    /// One that met [`FirstHit::WALL`].
+    pub(crate) fn of_wall(radiance: Vec3) -> Self {
+        Self { radiance, first_hit: FirstHit::WALL, rays: 1 }
+    }
 }
 
 /// Where a path is.

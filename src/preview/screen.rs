@@ -334,17 +334,13 @@ mod tests {
     use super::super::shared::Seat;
     use super::*;
     use crate::film::BlockSum;
-    use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use crate::integrator::{BlockWork, PathSample};
     use glam::Vec3;
 
     /// Adds a block of samples of one grey.
     fn add(film: &mut Film, work: BlockWork, grey: f32) {
         let mut sum = BlockSum::default();
-        let sample = PathSample {
-            radiance: Vec3::splat(grey),
-            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false },
-            rays: 1,
-        };
+        let sample = PathSample::of_wall(Vec3::splat(grey));
         (0..work.samples).for_each(|_| sum.add(&sample));
         film.merge_block(work, &sum);
     }
