@@ -58,31 +58,7 @@ impl Materials<'_> {
         transform: Option<Transform>,
         if_missing: [u8; 4],
     ) -> Result<Option<TextureLookup>, LoadError> {
-        let json = &self.document.as_json().textures[texture.index()];
-        let others = || json.extensions.iter().flat_map(|extensions| &extensions.others);
-        // Its image stands for the other, which is for programs that do not read WebP.
-        let webp =
-            others().find(|(name, _)| *name == "EXT_texture_webp").and_then(|(_, webp)| webp.get("source")?.as_u64());
-        let index = webp.map_or(json.source.value(), |index| index as usize);
-        let picture = match self.picture(index) {
-            Err(error) if error.is_unsupported() => {
-                builder.note(format!("Texture {}: {error}; left out.", texture.index()));
-                return Ok(None);
-            }
-            other => other?,
-        };
-        let Some(picture) = picture else {
-            let extensions: Vec<&str> = others().map(|(name, _)| name.as_str()).collect();
-            let why = if index < self.document.as_json().images.len() {
-                "its image has neither a file nor a buffer view".to_owned()
-            } else if extensions.is_empty() || webp.is_some() {
-                "its image is not there".to_owned()
-            } else {
-                format!("its image is that of {} alone, which is not read", extensions.join(", "))
-            };
-            builder.note(format!("Texture {}: {why}; left out.", texture.index()));
-            return Ok(None);
-        };
+        let Some(picture) = self.picture_of_texture(builder, texture)? else { return Ok(None) };
         let sampler = texture.sampler();
         let wrap = |mode| match mode {
             WrappingMode::ClampToEdge => Wrap::Clamp,
@@ -99,14 +75,40 @@ impl Materials<'_> {
             adjust: Adjust::NONE,
         });
         let plain = TextureLookup::plain(texture);
-        Ok(Some(match transform {
-            Some(Transform { offset, rotation, scale })
-                if offset.is_finite() && rotation.is_finite() && scale.is_finite() =>
-            {
-                TextureLookup { offset, rotation, scale, ..plain }
+        Ok(Some(transform.map_or(plain, |transform| transform.of(plain))))
+    }
+
+    /// The picture of a texture; a note says why there is none.
+    fn picture_of_texture(
+        &mut self,
+        builder: &mut Builder,
+        texture: &gltf::Texture,
+    ) -> Result<Option<Picture>, LoadError> {
+        let json = &self.document.as_json().textures[texture.index()];
+        let others = || json.extensions.iter().flat_map(|extensions| &extensions.others);
+        // Its image stands for the other, which is for programs that do not read WebP.
+        let webp =
+            others().find(|(name, _)| *name == "EXT_texture_webp").and_then(|(_, webp)| webp.get("source")?.as_u64());
+        let index = webp.map_or(json.source.value(), |index| index as usize);
+        let picture = match self.picture(index) {
+            Err(error) if error.is_unsupported() => {
+                builder.note(format!("Texture {}: {error}; left out.", texture.index()));
+                return Ok(None);
             }
-            _ => plain,
-        }))
+            other => other?,
+        };
+        if picture.is_none() {
+            let extensions: Vec<&str> = others().map(|(name, _)| name.as_str()).collect();
+            let why = if index < self.document.as_json().images.len() {
+                "its image has neither a file nor a buffer view".to_owned()
+            } else if extensions.is_empty() || webp.is_some() {
+                "its image is not there".to_owned()
+            } else {
+                format!("its image is that of {} alone, which is not read", extensions.join(", "))
+            };
+            builder.note(format!("Texture {}: {why}; left out.", texture.index()));
+        }
+        Ok(picture)
     }
 
     /// Where an image's bytes are. Not through the crate's `Image::source`, which panics without a MIME type.
@@ -149,6 +151,15 @@ pub(super) struct Transform {
     offset: Vec2,
     rotation: f32,
     scale: Vec2,
+}
+
+impl Transform {
+    /// A look-up so placed; as it was where the transform is not finite.
+    fn of(self, plain: TextureLookup) -> TextureLookup {
+        let Self { offset, rotation, scale } = self;
+        let is_finite = offset.is_finite() && rotation.is_finite() && scale.is_finite();
+        if is_finite { TextureLookup { offset, rotation, scale, ..plain } } else { plain }
+    }
 }
 
 /// The extension where the crate leaves it as JSON (normal maps).
