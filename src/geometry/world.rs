@@ -41,6 +41,15 @@ impl Hit {
     }
 }
 
+/// A sphere in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Its centre.
+    pub center: Vec3,
+    /// Its radius, above 0.
+    pub radius: f32,
+}
+
 /// A scene with its trees.
 pub struct World {
     scene: Arc<Scene>,
@@ -51,9 +60,7 @@ pub struct World {
     /// Over `items`, where they are many.
     top: Option<BinaryTree>,
     items: Vec<Item>,
-    center: Vec3,
-    /// Of the sphere around everything.
-    radius: f32,
+    around: Ball,
     has_alpha: bool,
     /// By instance.
     placements: Vec<Placement>,
@@ -89,9 +96,9 @@ impl World {
         &self.scene
     }
 
-    /// Centre of the bounding box and radius of the sphere around it; a unit sphere for an empty scene.
-    pub fn bounding_sphere(&self) -> (Vec3, f32) {
-        (self.center, self.radius)
+    /// The sphere around the bounding box; a unit sphere for an empty scene.
+    pub fn bounding_sphere(&self) -> Ball {
+        self.around
     }
 
     /// Triangles that were left out because they have no area.

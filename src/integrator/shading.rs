@@ -2,11 +2,11 @@
 
 use super::PathTracer;
 use super::frames::Frames;
-use super::media::{Crossing, Medium};
+use super::media::{Crossed, Crossing, Medium};
 use super::tables::{SurfaceTables, slope_width};
 use crate::bsdf::{
     self, Bsdf, CoatedDiffuse, Conductor, Dielectric, HeTorrance, MetalRoughnessParameters, Microfacets, Phong,
-    Varnish, Varnished, Ward,
+    Saturation, Varnish, Varnished, Ward,
 };
 use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
@@ -158,7 +158,8 @@ impl Reader<'_> {
             }
             (Surface::CoatedDiffuse { reflectance, roughness, saturates, .. }, tables) => {
                 let facets = self.facets(roughness);
-                Bsdf::CoatedDiffuse(CoatedDiffuse::new(self.base(reflectance), facets, *saturates, tables.coat()))
+                let saturation = if *saturates { Saturation::Repeated } else { Saturation::None };
+                Bsdf::CoatedDiffuse(CoatedDiffuse::new(self.base(reflectance), facets, saturation, tables.coat()))
             }
             (Surface::CoatedConductor { eta, k, roughness, coat_roughness, .. }, tables) => {
                 Bsdf::coated_conductor(*eta, *k, self.facets(roughness), self.facets(coat_roughness), tables.layers())
@@ -195,11 +196,11 @@ impl Shading<'_> {
 
     /// The volume whose boundary a path crosses that came along `wo` and goes on along `wi`, and which way; `None` where
     /// it stays on its side, or no volume absorbs.
-    pub(super) fn crossed_medium(&self, wo: Vec3, wi: Vec3) -> Option<(Medium, Crossing)> {
+    pub(super) fn crossed_medium(&self, wo: Vec3, wi: Vec3) -> Option<Crossed> {
         let medium = self.medium?;
         let (from_front, to_front) = (wo.dot(self.geometric_normal) > 0.0, wi.dot(self.geometric_normal) > 0.0);
         let crossing = if from_front { Crossing::In } else { Crossing::Out };
-        (from_front != to_front).then_some((medium, crossing))
+        (from_front != to_front).then_some(Crossed { medium, crossing })
     }
 
     /// Share of light from behind that goes straight on in the direction `wo`: 0 at the boundary of a volume.

@@ -4,7 +4,7 @@ use super::super::mesh_tree::MeshTree;
 use super::super::tree::{BinaryTree, Bounds};
 use super::super::wide_tree::TriangleRef;
 use super::at_hit::Placement;
-use super::{Item, World};
+use super::{Ball, Item, World};
 use crate::scene::{Alpha, Instance, Motion, Scene};
 use glam::{Vec3, Vec3A};
 use std::sync::Arc;
@@ -23,7 +23,7 @@ impl World {
         }
         let shared = place_instances(&scene, &uses, &mut items);
         place_spheres(&scene, &mut items);
-        let (center, radius) = sphere_around(&items.bounds);
+        let around = sphere_around(&items.bounds);
         let (top, items) = arranged(items);
         let has_alpha = scene.materials.iter().any(|m| m.alpha != Alpha::Opaque);
         let placements = scene
@@ -31,7 +31,7 @@ impl World {
             .iter()
             .map(|i| Placement::new(&scene, i, shared.of_mesh[i.mesh.0 as usize].map(|tree| tree as u32)))
             .collect();
-        Self { scene, fixed, shared: shared.trees, top, items, center, radius, has_alpha, placements }
+        Self { scene, fixed, shared: shared.trees, top, items, around, has_alpha, placements }
     }
 }
 
@@ -110,14 +110,14 @@ fn place_spheres(scene: &Scene, items: &mut BoundedItems) {
     }
 }
 
-/// Centre and radius of the sphere around the box around everything; a unit sphere where there is nothing.
-fn sphere_around(bounds: &[Bounds]) -> (Vec3, f32) {
+/// The sphere around the box around everything; a unit sphere where there is nothing.
+fn sphere_around(bounds: &[Bounds]) -> Ball {
     let bounds = bounds.iter().fold(Bounds::EMPTY, |all, b| all.union(*b));
     if !bounds.is_finite() {
-        return (Vec3::ZERO, 1.0);
+        return Ball { center: Vec3::ZERO, radius: 1.0 };
     }
     let center = (bounds.min + bounds.max) * 0.5;
-    (center.into(), (bounds.max - center).length().max(f32::MIN_POSITIVE))
+    Ball { center: center.into(), radius: (bounds.max - center).length().max(f32::MIN_POSITIVE) }
 }
 
 /// Items in the order in which they are met, with a tree over them where they are many; those without a finite box are left out.
