@@ -4,7 +4,7 @@ use crate::support::CpuClock;
 use anyhow::{Context, Result};
 use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
-use fechner::preview::{Closer, Door, Host, Job, Options, Shown, Spectator, start};
+use fechner::preview::{Closer, Door, Host, Job, Options, Shown, Spectator, Stage, start};
 use fechner::scene::Scene;
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -91,7 +91,7 @@ impl Spectator for Watcher {
             step: shown.step,
             width: shown.film.width() as usize,
             rgb_cd_m2: if self.keeps_pictures { shown.rgb_cd_m2.to_vec() } else { Vec::new() },
-            is_at_rest: shown.is_at_rest,
+            is_at_rest: shown.stage == Stage::AtRest,
         };
         // Nobody listens any more at the end.
         let _ = self.moments.send(moment);

@@ -107,9 +107,8 @@ pub fn audit(
     );
     let found = judgement.thresholds.in_bands.measured_visibility(&displayed);
     let predicted = judgement.thresholds.in_bands.predicted_visibility(&variance);
-    let energies = tiles.iter().map(|tile| (tile.energy(&found), tile.energy(&predicted))).collect::<Vec<_>>();
-    let (ratio, standard_error) = ratio_of_sums(&energies);
-    Ok(Some(Audit { tiles: tiles.len(), samples: fresh.samples, ratio, standard_error }))
+    let energy = |tile: &Tile| Energy { found: tile.energy(&found), predicted: tile.energy(&predicted) };
+    Ok(Some(Audit::of(&tiles.iter().map(energy).collect::<Vec<_>>(), fresh.samples)))
 }
 
 /// A square of pixels.
@@ -208,18 +207,27 @@ fn repetition(film: &Film, pixels: &[usize], times: u32) -> SamplePlan {
     plan
 }
 
-/// Σ found / Σ predicted and its standard error (the usual ratio estimator's): see [`Audit`].
-fn ratio_of_sums(energies: &[(f64, f64)]) -> (f64, f64) {
-    let found: f64 = energies.iter().map(|e| e.0).sum();
-    let predicted: f64 = energies.iter().map(|e| e.1).sum();
-    let n = energies.len() as f64;
-    if predicted <= 0.0 {
-        return (1.0, f64::INFINITY);
+/// Visible energy of a tile.
+#[derive(Clone, Copy, Debug)]
+struct Energy {
+    found: f64,
+    predicted: f64,
+}
+
+impl Audit {
+    /// By the energies of its tiles: Σ found / Σ predicted and the usual ratio estimator's standard error.
+    fn of(energies: &[Energy], samples: u64) -> Self {
+        let tiles = energies.len();
+        let found: f64 = energies.iter().map(|energy| energy.found).sum();
+        let predicted: f64 = energies.iter().map(|energy| energy.predicted).sum();
+        if predicted <= 0.0 {
+            return Self { tiles, samples, ratio: 1.0, standard_error: f64::INFINITY };
+        }
+        let (n, ratio) = (tiles as f64, found / predicted);
+        let scatter: f64 = energies.iter().map(|energy| (energy.found - ratio * energy.predicted).powi(2)).sum();
+        let standard_error = if n > 1.0 { (scatter * n / (n - 1.0)).sqrt() / predicted } else { f64::INFINITY };
+        Self { tiles, samples, ratio, standard_error }
     }
-    let ratio = found / predicted;
-    let scatter: f64 = energies.iter().map(|(found, predicted)| (found - ratio * predicted).powi(2)).sum();
-    let standard_error = if n > 1.0 { (scatter * n / (n - 1.0)).sqrt() / predicted } else { f64::INFINITY };
-    (ratio, standard_error)
 }
 
 #[cfg(test)]

@@ -63,10 +63,8 @@ impl<'a> Forecast<'a> {
 
 /// Displayed variance of every pixel's mean, (cd/m²)², where it is `share(pixel)` of one sample's.
 fn variance(film: &Film, judgement: &Judgement, share: impl Fn(usize) -> f64 + Sync) -> Plane {
-    let (width, per_sample) = (film.width() as usize, &judgement.pooled_variance_per_sample);
-    Plane::from_fn(width, film.height() as usize, |x, y| {
-        (f64::from(per_sample.get(x, y)) * share(y * width + x)) as f32
-    })
+    let per_sample = judgement.pooled_variance_per_sample.values();
+    film.plane(|pixel| (f64::from(per_sample[pixel]) * share(pixel)) as f32)
 }
 
 #[cfg(test)]

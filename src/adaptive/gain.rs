@@ -146,7 +146,7 @@ mod tests {
     use super::super::test_films::{film_of, film_of_halves, settings};
     use super::*;
     use crate::film::{BlockSum, KnownLamps};
-    use crate::integrator::{FirstHit, PathSample};
+    use crate::integrator::PathSample;
     use glam::Vec3;
 
     /// Of more than can be had at once, noisy pixels have theirs first; what is little is not cut.
@@ -183,10 +183,9 @@ mod tests {
         let ahead = plan_up_to(&film, |pixel| if pixel % 2 == 0 { 64 } else { 16 });
         for block in ahead.blocks.into_iter().filter(|block| block.half == Half::B) {
             let mut sum = BlockSum::default();
-            let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
             (0..block.samples).for_each(|index| {
                 let radiance = Vec3::splat(if index % 2 == 0 { 0.5 } else { 1.5 });
-                sum.add(&PathSample { radiance, first_hit, rays: 1 });
+                sum.add(&PathSample::of_wall(radiance));
             });
             film.merge_block(block, &sum);
         }

@@ -125,7 +125,6 @@ fn judge_by(
     let started = Instant::now();
     let estimate = film.estimate(settings.nits_per_unit);
     let denoised = denoiser.map(|denoiser| TimedDenoising::of(denoiser, film, settings.nits_per_unit)).transpose()?;
-    let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
     let raw_inflation = if denoised.is_some() { 1.0 } else { inflation };
 
     let guide = Guide::of(film, &estimate, denoised.as_ref(), settings);
@@ -156,62 +155,66 @@ fn judge_by(
         None
     };
     still_wanted(settings)?;
-    let raw_noise = || thresholds.visibility(&scatter.of_mean(&per_sample.pooled));
-    let look = Look {
-        film,
-        settings,
-        estimate: &estimate,
-        tone: tone.as_ref(),
-        thresholds: &thresholds,
-        raw_noise: &raw_noise,
-        over_white: over_white.as_ref(),
-    };
-    let denoised = denoised.map(|found| look.judged_picture(found, inflation)).transpose()?;
-    still_wanted(settings)?;
-    let predicted = look.predicted(denoised.as_ref());
-    let PerSample { met, pooled, pooled_of_halves, of_halves } =
-        per_sample.or_over_white(over_white.as_ref(), &thresholds);
-    Ok(Judgement {
-        estimate,
-        denoised,
-        seconds: started.elapsed().as_secs_f64(),
-        seconds_denoising,
-        tone,
-        thresholds,
-        importance: settings.importance.clone(),
-        is_known: film.has_both_halves(),
-        predicted,
-        pooled_variance_per_sample: pooled,
-        pooled_of_halves,
-        variance_per_sample: of_halves,
-        met_per_sample: met,
-        over_white,
-        measured: OnceLock::new(),
-    })
+    let look = Look { started, film, settings, estimate, tone, scatter, thresholds, per_sample, over_white };
+    look.finished(denoised, inflation)
 }
 
 /// What is found on the way to a picture's noise.
 struct Look<'a> {
+    started: Instant,
     film: &'a Film,
     settings: &'a LoopSettings,
-    estimate: &'a Estimate,
-    tone: &'a dyn FittedTone,
-    thresholds: &'a Thresholds,
-    /// Visibility of the raw mean's noise before black, which costs as much as the thresholds.
-    raw_noise: &'a dyn Fn() -> Plane,
-    over_white: Option<&'a OverWhite>,
+    estimate: Estimate,
+    tone: Box<dyn FittedTone>,
+    scatter: Scatter,
+    thresholds: Thresholds,
+    per_sample: PerSample,
+    over_white: Option<OverWhite>,
 }
 
 impl Look<'_> {
+    /// By its end. Of the denoised picture's error, if there is one, what is inferred is multiplied by the root of `inflation`.
+    fn finished(self, denoised: Option<TimedDenoising>, inflation: f64) -> Result<Judgement, JudgeError> {
+        let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
+        let denoised = denoised.map(|found| self.judged_picture(found, inflation)).transpose()?;
+        still_wanted(self.settings)?;
+        let predicted = self.predicted(denoised.as_ref());
+        let Self { started, film, settings, estimate, tone, thresholds, per_sample, over_white, .. } = self;
+        let PerSample { met, pooled, pooled_of_halves, of_halves } =
+            per_sample.or_over_white(over_white.as_ref(), &thresholds);
+        Ok(Judgement {
+            estimate,
+            denoised,
+            seconds: started.elapsed().as_secs_f64(),
+            seconds_denoising,
+            tone,
+            thresholds,
+            importance: settings.importance.clone(),
+            is_known: film.has_both_halves(),
+            predicted,
+            pooled_variance_per_sample: pooled,
+            pooled_of_halves,
+            variance_per_sample: of_halves,
+            met_per_sample: met,
+            over_white,
+            measured: OnceLock::new(),
+        })
+    }
+
+    /// Visibility of the raw mean's noise before black, which costs as much as the thresholds.
+    fn raw_noise(&self) -> Plane {
+        self.thresholds.visibility(&self.scatter.of_mean(&self.per_sample.pooled))
+    }
+
     /// The denoised picture and its error, of which what is inferred is multiplied by the root of `inflation`.
     fn judged_picture(&self, found: TimedDenoising, inflation: f64) -> Result<DenoisedPicture, JudgeError> {
         let mut picture =
-            found.judged(self.film, self.settings, self.tone, &self.thresholds.in_bands, self.estimate)?;
+            found.judged(self.film, self.settings, self.tone.as_ref(), &self.thresholds.in_bands, &self.estimate)?;
         picture.error.raise_inferred(inflation.sqrt());
         if self.film.width().min(self.film.height()) < LEAST_SIDE_OF_HALVES {
-            picture.error = picture.error.with_noise_of_at_least(&(self.raw_noise)());
+            picture.error = picture.error.with_noise_of_at_least(&self.raw_noise());
         }
-        if let Some(over_white) = self.over_white {
+        if let Some(over_white) = &self.over_white {
             // Alpha is not denoised.
             picture.error = picture.error.with_noise_of_at_least(over_white.visibility());
         }
@@ -226,7 +229,7 @@ impl Look<'_> {
         }
         let of_error = match denoised {
             Some(denoised) => denoised.error.visibility.clone(),
-            None => worse_of((self.raw_noise)(), self.over_white.map(OverWhite::visibility)),
+            None => worse_of(self.raw_noise(), self.over_white.as_ref().map(OverWhite::visibility)),
         };
         // An infinite variance, pooled with others, is NaN.
         let of_error = of_error.map(|v| if v.is_nan() { f32::INFINITY } else { v });
@@ -333,27 +336,27 @@ impl Judgement {
 
 /// Luminance of a half, cd/m²; of the other one where it has no samples.
 pub(super) fn half_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
-    let width = film.width() as usize;
-    Plane::from_fn(width, film.height() as usize, |x, y| {
-        (nits_per_unit * film.halves(y * width + x).half_or_other(half).luminance()) as f32
-    })
+    film.plane(|pixel| (nits_per_unit * film.halves(pixel).half_or_other(half).luminance()) as f32)
 }
 
 /// The denoised picture, cd/m²: what adaptation, masking and the operator are made from, so that noise neither
 /// masks itself nor raises its own adaptation. Never output.
 pub(crate) fn guide_rgb(film: &Film, estimate: &Estimate) -> Vec<[f32; 3]> {
-    let (width, height) = (film.width() as usize, film.height() as usize);
-    let albedo: Vec<_> = film.guides().iter().map(|g| g.albedo).collect();
-    let normal: Vec<_> = film.guides().iter().map(|g| g.normal).collect();
-    let depth: Vec<_> = film.guides().iter().map(|g| g.depth).collect();
+    let albedo: Vec<_> = film.guides().iter().map(|guide| guide.albedo).collect();
+    without_noise(film, &estimate.rgb_cd_m2, &estimate.variance_of_mean, &albedo)
+}
+
+/// A picture of what the film's first surfaces show, without its noise. `albedo`: what to divide by before.
+fn without_noise(film: &Film, rgb: &[[f32; 3]], variance: &Plane, albedo: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let guides = film.guides();
     denoise(&GuideInputs {
-        rgb: &estimate.rgb_cd_m2,
-        variance: &estimate.variance_of_mean,
-        albedo: &albedo,
-        normal: &normal,
-        depth: &depth,
-        width,
-        height,
+        rgb,
+        variance,
+        albedo,
+        normal: &guides.iter().map(|guide| guide.normal).collect::<Vec<_>>(),
+        depth: &guides.iter().map(|guide| guide.depth).collect::<Vec<_>>(),
+        width: film.width() as usize,
+        height: film.height() as usize,
     })
 }
 

@@ -98,6 +98,12 @@ pub struct LastLook {
     pub stop_reason: StopReason,
 }
 
+/// What a look saw, and what comes of it.
+struct Decision {
+    judgement: Judgement,
+    step: Step,
+}
+
 /// What to do after a look.
 #[derive(Debug)]
 enum Step {
@@ -262,7 +268,7 @@ impl<'a> Loop<'a> {
             }
             let look = Instant::now();
             let earlier = last_look.take();
-            let (judgement, step) = with_threads_awake(|| self.look_and_decide(earlier, ended))?;
+            let Decision { judgement, step } = with_threads_awake(|| self.look_and_decide(earlier, ended))?;
             match self.take(step, &judgement, look, monitor) {
                 None => last_look = Some(judgement),
                 Some(stop_reason) => {
@@ -312,7 +318,7 @@ impl<'a> Loop<'a> {
         &mut self,
         earlier: Option<Judgement>,
         ended: Option<StopReason>,
-    ) -> Result<(Judgement, Step), JudgeError> {
+    ) -> Result<Decision, JudgeError> {
         let mut judgement = match earlier {
             Some(earlier) if self.is_looked_at() || ended.is_none() && self.exposure_holds() => earlier,
             _ if ended.is_some() => self.look(judge)?,
@@ -322,7 +328,7 @@ impl<'a> Loop<'a> {
             Some(reason) => Step::Stop(reason),
             None => self.next_step(&mut judgement)?,
         };
-        Ok((judgement, step))
+        Ok(Decision { judgement, step })
     }
 
     /// Traces what is planned, and says why the render ends if it does. A plan that was begun is finished first, unless

@@ -179,7 +179,7 @@ mod tests {
     use super::*;
     use crate::adaptive::plan::pilot_plan;
     use crate::film::BlockSum;
-    use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use crate::integrator::{BlockWork, PathSample};
     use crate::sampler::unit_of_hash;
     use glam::Vec3;
 
@@ -193,13 +193,12 @@ mod tests {
     }
 
     fn extend(film: &mut Film, block: BlockWork, noise: f32) {
-        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
         let mut sum = BlockSum::default();
         for index in block.first..block.first + block.samples {
             let key = u64::from(block.pixel) << 32 | u64::from(block.level) << 24 | u64::from(index);
             let u = unit_of_hash(hash_words(key, block.half.index() as u64)) - 0.5;
             let value = if block.pixel % 32 < 16 { 0.5 + noise * u * 12f32.sqrt() } else { 0.5 };
-            sum.add(&PathSample { radiance: Vec3::splat(value), first_hit, rays: 1 });
+            sum.add(&PathSample::of_wall(Vec3::splat(value)));
         }
         film.merge_block(block, &sum);
     }

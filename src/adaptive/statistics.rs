@@ -190,7 +190,7 @@ pub fn find_outliers(film: &Film) -> Outliers {
 mod tests {
     use super::*;
     use crate::film::BlockSum;
-    use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use crate::integrator::{BlockWork, PathSample};
     use glam::Vec3;
 
     /// A film whose pixel values come from `value(pixel, random in [0,1))`, with independent samples.
@@ -205,17 +205,7 @@ mod tests {
                     for _ in 0..work.samples {
                         counter += 1;
                         let u = crate::sampler::unit_of_hash(crate::sampler::hash_words(counter, 99));
-                        sum.add(&PathSample {
-                            radiance: Vec3::splat(value(pixel, u)),
-                            first_hit: FirstHit {
-                                albedo: Vec3::ONE,
-                                normal: Vec3::Z,
-                                depth: 1.0,
-                                object_id: 1,
-                                shines: false,
-                            },
-                            rays: 1,
-                        });
+                        sum.add(&PathSample::of_wall(Vec3::splat(value(pixel, u))));
                     }
                     film.merge_block(work, &sum);
                 }
@@ -265,11 +255,7 @@ mod tests {
         let pixel = 12 * 24 + 12;
         let base = film_of(24, 24, 1, |_, u| u);
         let mut changed = base.clone();
-        let wild = PathSample {
-            radiance: Vec3::splat(1000.0),
-            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false },
-            rays: 1,
-        };
+        let wild = PathSample::of_wall(Vec3::splat(1000.0));
         let mut sum = BlockSum::default();
         sum.add(&wild);
         changed.merge_block(BlockWork { samples: 1, ..BlockWork::whole(pixel, Half::A, 1) }, &sum);

@@ -1,8 +1,8 @@
 //! Films of known noise, for tests.
 
 use super::settings::LoopSettings;
-use crate::film::{BlockSum, Film};
-use crate::integrator::{BlockWork, FirstHit, PILOT_SAMPLES_A_HALF, PathSample};
+use crate::film::{Film, film_of_samples};
+use crate::integrator::{FirstHit, PILOT_SAMPLES_A_HALF, PathSample};
 use crate::sampler::{Half, hash_words, unit_of_hash};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::operator;
@@ -30,19 +30,10 @@ pub(super) fn film_of_halves(
     shines: impl Fn(u32) -> bool,
     color: impl Fn(u32, Half, f32) -> Vec3,
 ) -> Film {
-    let mut film = Film::new(64, 64);
-    for pixel in 0..64 * 64 {
-        let first_hit =
-            FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: shines(pixel) };
-        for (half, samples) in Half::BOTH.into_iter().zip(samples) {
-            let mut sum = BlockSum::default();
-            for index in 0..samples {
-                let key = u64::from(pixel) << 8 | u64::from(index);
-                let random = 2.0 * unit_of_hash(hash_words(key, half.index() as u64)) - 1.0;
-                sum.add(&PathSample { radiance: color(pixel, half, random), first_hit, rays: 1 });
-            }
-            film.merge_block(BlockWork { samples, ..BlockWork::whole(pixel, half, 0) }, &sum);
-        }
-    }
-    film
+    film_of_samples([64, 64], samples, |pixel, half, index| {
+        let key = u64::from(pixel) << 8 | u64::from(index);
+        let random = 2.0 * unit_of_hash(hash_words(key, half.index() as u64)) - 1.0;
+        let first_hit = FirstHit { shines: shines(pixel), ..FirstHit::WALL };
+        PathSample { radiance: color(pixel, half, random), first_hit, rays: 1 }
+    })
 }

@@ -83,10 +83,7 @@ impl Reference {
         let rgb = |half: Half| film.half(half).iter().map(|p| p.mean.map(|v| (v * nits) as f32)).collect();
         let own_variance = |c: usize| {
             let [a, b] = Half::BOTH.map(|half| film.half(half));
-            Plane::from_fn(film.width() as usize, film.height() as usize, |x, y| {
-                let i = y * film.width() as usize + x;
-                (0.5 * (a[i].sample_variance(c) + b[i].sample_variance(c)) * nits * nits) as f32
-            })
+            film.plane(|i| (0.5 * (a[i].sample_variance(c) + b[i].sample_variance(c)) * nits * nits) as f32)
         };
         Ok(Self {
             width: film.width() as usize,

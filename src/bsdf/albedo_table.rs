@@ -109,17 +109,15 @@ impl AlbedoTable {
 
     /// The table at `roughness` in [0, 1].
     pub(crate) fn curve(&self, roughness: f32) -> AlbedoCurve<'_> {
-        let (row, fraction) = position(roughness, ROUGHNESS_NODES);
-        let (average, average_fraction) = position(roughness, AVERAGE_NODES);
+        let TablePlace { node, fraction } = position(roughness, ROUGHNESS_NODES);
+        let average = position(roughness, AVERAGE_NODES).value(&self.averages_over_alpha2);
         let alpha = roughness * roughness;
         AlbedoCurve {
-            lower: &self.rows[row],
-            upper: &self.rows[row + 1],
+            lower: &self.rows[node],
+            upper: &self.rows[node + 1],
             fraction,
             alpha,
-            average: alpha
-                * alpha
-                * lerp(self.averages_over_alpha2[average], self.averages_over_alpha2[average + 1], average_fraction),
+            average: alpha * alpha * average,
         }
     }
 }
@@ -128,12 +126,8 @@ impl AlbedoCurve<'_> {
     /// The value at an incident cosine in (0, 1].
     pub(crate) fn at(&self, mu: f32) -> f32 {
         let t = column_of_cosine(mu.max(f32::MIN_POSITIVE), self.alpha);
-        let (column, fraction) = position(t, COSINE_NODES);
-        lerp(
-            lerp(self.lower[column], self.lower[column + 1], fraction),
-            lerp(self.upper[column], self.upper[column + 1], fraction),
-            self.fraction,
-        )
+        let column = position(t, COSINE_NODES);
+        lerp(column.value(self.lower), column.value(self.upper), self.fraction)
     }
 }
 
@@ -219,11 +213,11 @@ impl PairTable {
 
     /// The tables at `roughness` in [0, 1].
     pub(crate) fn curve(&self, roughness: f32) -> PairCurve<'_> {
-        let (row, fraction) = position(roughness, ROUGHNESS_NODES);
-        let (node, node_fraction) = position(roughness, AVERAGE_NODES);
+        let TablePlace { node: row, fraction } = position(roughness, ROUGHNESS_NODES);
+        let average = position(roughness, AVERAGE_NODES);
         let alpha = roughness * roughness;
-        let ([a, b], [c, d]) = (self.averages_over_alpha2[node], self.averages_over_alpha2[node + 1]);
-        let averages = [lerp(a, c, node_fraction), lerp(b, d, node_fraction)].map(|ratio| alpha * alpha * ratio);
+        let [low, high] = [average.node, average.node + 1].map(|node| self.averages_over_alpha2[node]);
+        let averages = [0, 1].map(|k| alpha * alpha * lerp(low[k], high[k], average.fraction));
         PairCurve { lower: &self.rows[row], upper: &self.rows[row + 1], fraction, alpha, averages }
     }
 }
@@ -232,7 +226,7 @@ impl PairCurve<'_> {
     /// Both values at an incident cosine in (0, 1].
     pub(crate) fn at(&self, mu: f32) -> [f32; 2] {
         let t = column_of_cosine(mu.max(f32::MIN_POSITIVE), self.alpha);
-        let (column, fraction) = position(t, COSINE_NODES);
+        let TablePlace { node: column, fraction } = position(t, COSINE_NODES);
         let (lower, upper) =
             ([self.lower[column], self.lower[column + 1]], [self.upper[column], self.upper[column + 1]]);
         [0, 1].map(|k| {
@@ -293,11 +287,35 @@ fn cosine_average(curve: &AlbedoCurve<'_>) -> f32 {
     sum
 }
 
-/// Index of the node below `x` in [0, 1] and how far `x` lies towards the next.
-fn position(x: f32, nodes: usize) -> (usize, f32) {
-    let scaled = x.clamp(0.0, 1.0) * (nodes - 1) as f32;
-    let index = (scaled as usize).min(nodes - 2);
-    (index, scaled - index as f32)
+/// A place between two nodes of a table.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TablePlace {
+    /// The lower one.
+    pub(super) node: usize,
+    /// How far it lies towards the next, in [0, 1].
+    pub(super) fraction: f32,
+}
+
+impl TablePlace {
+    /// Of `x` in [0, 1] among so many nodes, two at least.
+    #[inline]
+    pub(super) fn of(x: f32, nodes: usize) -> Self {
+        let scaled = x * (nodes - 1) as f32;
+        let node = (scaled as usize).min(nodes - 2);
+        Self { node, fraction: scaled - node as f32 }
+    }
+
+    /// A table's value there.
+    #[inline]
+    fn value(self, nodes: &[f32]) -> f32 {
+        lerp(nodes[self.node], nodes[self.node + 1], self.fraction)
+    }
+}
+
+/// Of `x`, which may lie outside of [0, 1].
+#[inline]
+fn position(x: f32, nodes: usize) -> TablePlace {
+    TablePlace::of(x.clamp(0.0, 1.0), nodes)
 }
 
 fn lerp(a: f32, b: f32, t: f32) -> f32 {

@@ -3,7 +3,7 @@
 //! They depend on two widths, a cosine and an azimuth. Materials of constant widths, which most are, need only the last
 //! two; a texture of roughness gets a coarser table over widths as well. Make one a material.
 
-use super::albedo_table::{average_over_visible_normals, column_of_cosine, cosine_of_column};
+use super::albedo_table::{TablePlace, average_over_visible_normals, column_of_cosine, cosine_of_column};
 use super::microfacets::Microfacets;
 use crate::scene::Distribution;
 use glam::Vec3;
@@ -36,14 +36,24 @@ impl WidthRange {
     }
 }
 
-/// Neighbouring nodes of a width and how far it lies towards the upper one.
-pub(crate) fn place_between(alpha: f32, nodes: usize) -> (usize, usize, f32) {
-    if nodes == 1 {
-        return (0, 0, 0.0);
+/// Nodes beside a width, which are the same where there is only one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NodesBeside {
+    pub(super) low: usize,
+    pub(super) high: usize,
+    /// How far the width lies towards the upper one.
+    pub(super) fraction: f32,
+}
+
+impl NodesBeside {
+    /// Among as many as [`WidthRange::nodes`] made.
+    pub(super) fn of(alpha: f32, nodes: usize) -> Self {
+        if nodes == 1 {
+            return Self { low: 0, high: 0, fraction: 0.0 };
+        }
+        let TablePlace { node, fraction } = TablePlace::of(alpha.sqrt(), nodes);
+        Self { low: node, high: node + 1, fraction }
     }
-    let scaled = alpha.sqrt() * (nodes - 1) as f32;
-    let low = (scaled as usize).min(nodes - 2);
-    (low, low + 1, scaled - low as f32)
 }
 
 /// The azimuths of a table's rows, from x to y: equally spaced in w/(1 + w), where w = |y|√α_y/(|x|√α_x).
@@ -70,14 +80,12 @@ impl Azimuths {
         Vec3::new(radius * x, radius * y, mu)
     }
 
-    /// The row before a direction and how far it lies towards the next.
-    pub(super) fn place(&self, w: Vec3) -> (usize, f32) {
+    /// Where a direction lies between two rows.
+    pub(super) fn place(&self, w: Vec3) -> TablePlace {
         let (x, y) = (w.x.abs() * self.roots[0], w.y.abs() * self.roots[1]);
         // Along the normal all rows are one.
         let share = if x + y > 0.0 { y / (x + y) } else { 0.5 };
-        let scaled = share * (AZIMUTHS - 1) as f32;
-        let row = (scaled as usize).min(AZIMUTHS - 2);
-        (row, scaled - row as f32)
+        TablePlace::of(share, AZIMUTHS)
     }
 }
 
@@ -135,8 +143,8 @@ impl AnisotropicTable {
     }
 
     pub(crate) fn curve(&self, [alpha_x, alpha_y]: [f32; 2]) -> AnisotropicCurve<'_> {
-        let (x0, x1, x) = place_between(alpha_x, self.counts[0]);
-        let (y0, y1, y) = place_between(alpha_y, self.counts[1]);
+        let NodesBeside { low: x0, high: x1, fraction: x } = NodesBeside::of(alpha_x, self.counts[0]);
+        let NodesBeside { low: y0, high: y1, fraction: y } = NodesBeside::of(alpha_y, self.counts[1]);
         let at = |x: usize, y: usize| &self.cells[x * self.counts[1] + y];
         AnisotropicCurve {
             cells: [at(x0, y0), at(x0, y1), at(x1, y0), at(x1, y1)],
@@ -178,7 +186,7 @@ impl Cell {
     }
 
     fn at(&self, w: Vec3) -> f32 {
-        let (low, towards) = self.azimuths.place(w);
+        let TablePlace { node: low, fraction: towards } = self.azimuths.place(w);
         let column = column_of_cosine(w.z.max(f32::MIN_POSITIVE), self.alpha).clamp(0.0, 1.0) * (COSINES - 1) as f32;
         let left = (column as usize).min(COSINES - 2);
         let along = |row: &[f32; COSINES]| row[left] + (row[left + 1] - row[left]) * (column - left as f32);

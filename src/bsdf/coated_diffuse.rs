@@ -1,9 +1,8 @@
 //! Plastic, varnished wood, glazed ceramics: a clear dielectric coat, smooth or rough, over a diffuse base.
 //!
 //! Parameters: `reflectance`, albedo of the base per linear RGB channel in [0, 1]; the coat's index of refraction (at
-//! least 1) and distribution, by its tables; the coat's facets; `saturates`, whether light that the coat turns back inside
-//! meets the base again and takes on more of its colour, as it does in reality (without it, albedo is `reflectance` times
-//! what the coat lets in, as in simpler models that scenes of others may expect).
+//! least 1) and distribution, by its tables; the coat's facets; what comes of light that the coat turns back inside
+//! ([`Saturation`]).
 //!
 //! Sources: the coupling of `coat`; the series ρ(1 − r)/(1 − ρr) of light between coat and base, r being the share of
 //! diffuse light that the coat turns back, of J. Saunderson (1942). Lossless for a white base.
@@ -23,12 +22,24 @@ pub struct CoatedDiffuse<'a> {
     base: Vec3,
 }
 
+/// What light that the coat turns back inside does to the base's colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Saturation {
+    /// It meets the base again and takes on more of its colour, as it does in reality.
+    Repeated,
+    /// Nothing: albedo is `reflectance` times what the coat lets in, as in simpler models that scenes of others may expect.
+    None,
+}
+
 impl<'a> CoatedDiffuse<'a> {
     /// The parameters as in the file's head.
-    pub fn new(reflectance: Vec3, microfacets: Microfacets, saturates: bool, tables: &'a CoatTables) -> Self {
+    pub fn new(reflectance: Vec3, microfacets: Microfacets, saturation: Saturation, tables: &'a CoatTables) -> Self {
         let coat = tables.coat(microfacets.rough().as_ref());
         let back = coat.turned_back();
-        let base = if saturates { reflectance * (1.0 - back) / (Vec3::ONE - reflectance * back) } else { reflectance };
+        let base = match saturation {
+            Saturation::Repeated => reflectance * (1.0 - back) / (Vec3::ONE - reflectance * back),
+            Saturation::None => reflectance,
+        };
         Self { coat, base }
     }
 

@@ -16,10 +16,11 @@
 mod building;
 
 use self::building::CoatOver;
+use super::albedo_table::TablePlace;
 use super::anisotropic_table::Azimuths;
 use super::coat::{Coat, CoatTables};
 use super::layer_walk::{Metal, Nodes};
-use super::layer_widths::{LayerWidths, WidthNodes};
+use super::layer_widths::{LayerWidths, Weighed, WidthNodes};
 use super::microfacets::Microfacets;
 use crate::scene::Distribution;
 use glam::Vec3;
@@ -106,13 +107,13 @@ impl LayerTables {
             average_later: 0.0,
             later_escape: 0.0,
         };
-        let bases = self.base_nodes.place(base);
+        let bases = self.base_nodes.beside(base);
         let mut count = 0;
-        for (coat_node, coat_weight) in self.coat_nodes.place(coat) {
-            for (base_node, base_weight) in bases {
-                let weight = coat_weight * base_weight;
+        for of_coat in self.coat_nodes.beside(coat) {
+            for of_base in bases {
+                let weight = of_coat.weight * of_base.weight;
                 if weight > 0.0 && count < MOST_CELLS {
-                    let cell = &self.cells[coat_node * self.base_nodes.count() + base_node];
+                    let cell = &self.cells[of_coat.index * self.base_nodes.count() + of_base.index];
                     curve.add(count, cell, weight);
                     count += 1;
                 }
@@ -161,29 +162,28 @@ pub(super) fn seen_through(base: Microfacets, coat: &Coat<'_>) -> Option<Microfa
     Some(Microfacets::new(widen(x, coat_x), widen(y, coat_y), base.distribution()))
 }
 
-/// Column below a cosine outside and how far it lies towards the next.
-fn place(mu: f32) -> (usize, f32) {
-    let scaled = mu.clamp(0.0, 1.0).sqrt() * (COLUMNS - 1) as f32;
-    let column = (scaled as usize).min(COLUMNS - 2);
-    (column, scaled - column as f32)
+/// Where a cosine outside lies between two columns.
+fn place(mu: f32) -> TablePlace {
+    TablePlace::of(mu.clamp(0.0, 1.0).sqrt(), COLUMNS)
 }
 
 impl Cell {
     /// The rows beside a direction outside and how much each counts.
-    fn rows_beside(&self, w: Vec3) -> [(usize, f32); 2] {
+    fn rows_beside(&self, w: Vec3) -> [Weighed; 2] {
         if self.rows.len() == 1 {
-            return [(0, 1.0), (0, 0.0)];
+            return [Weighed { index: 0, weight: 1.0 }, Weighed::NOTHING];
         }
-        let (row, fraction) = self.azimuths.place(w);
-        [(row, 1.0 - fraction), (row + 1, fraction)]
+        let TablePlace { node: row, fraction } = self.azimuths.place(w);
+        [Weighed { index: row, weight: 1.0 - fraction }, Weighed { index: row + 1, weight: fraction }]
     }
 
-    /// Adds what is tabulated for a direction outside that lies so far between two columns.
-    fn add_to(&self, sum: &mut LayerPoint, w: Vec3, (column, fraction): (usize, f32), weight: f32) {
-        for (row, share) in self.rows_beside(w) {
+    /// Adds what is tabulated for a direction outside, whose cosine lies there between two columns.
+    fn add_to(&self, sum: &mut LayerPoint, w: Vec3, column: TablePlace, weight: f32) {
+        let TablePlace { node, fraction } = column;
+        for Weighed { index, weight: share } in self.rows_beside(w) {
             if share > 0.0 {
-                sum.add(&self.rows[row][column], weight * share * (1.0 - fraction));
-                sum.add(&self.rows[row][column + 1], weight * share * fraction);
+                sum.add(&self.rows[index][node], weight * share * (1.0 - fraction));
+                sum.add(&self.rows[index][node + 1], weight * share * fraction);
             }
         }
     }

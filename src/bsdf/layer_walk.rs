@@ -26,13 +26,32 @@ const REFLECTIONS: usize = 64;
 /// Azimuths of a quadrant over which what anisotropic facets do is averaged.
 const AZIMUTHS: usize = 8;
 
+/// What layers do at one azimuth and another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum OverAzimuths {
+    /// The same.
+    Alike,
+    /// Not the same.
+    Varying,
+}
+
+impl OverAzimuths {
+    /// Of layers with such facets, or none.
+    pub(super) fn of<'a>(facets: impl IntoIterator<Item = &'a Microfacets>) -> Self {
+        if facets.into_iter().all(Microfacets::is_isotropic) { Self::Alike } else { Self::Varying }
+    }
+}
+
 /// Directions of cosine `mu` and how much each counts: one where all azimuths are alike, else the middles of equal parts of a
 /// quadrant.
-pub(super) fn directions(mu: f32, is_isotropic: bool) -> impl Iterator<Item = (f32, Vec3)> {
-    let count = if is_isotropic { 1 } else { AZIMUTHS };
+pub(super) fn directions(mu: f32, over_azimuths: OverAzimuths) -> impl Iterator<Item = (f32, Vec3)> {
     let along_x = direction_at(mu);
+    let count = match over_azimuths {
+        OverAzimuths::Alike => 1,
+        OverAzimuths::Varying => AZIMUTHS,
+    };
     (0..count).map(move |index| {
-        if is_isotropic {
+        if over_azimuths == OverAzimuths::Alike {
             return (1.0, along_x);
         }
         let (sin, cos) = (FRAC_PI_2 * (index as f32 + 0.5) / AZIMUTHS as f32).sin_cos();
@@ -42,7 +61,7 @@ pub(super) fn directions(mu: f32, is_isotropic: bool) -> impl Iterator<Item = (f
 
 /// Directions of cosine `mu`, facet normals visible from there, and weights before both, whose sum is 1.
 fn seen_facets(facets: &Microfacets, mu: f32) -> impl Iterator<Item = (f32, Vec3, Vec3)> {
-    directions(mu, facets.is_isotropic()).flat_map(move |(share, w)| {
+    directions(mu, OverAzimuths::of([facets])).flat_map(move |(share, w)| {
         visible_normals_and_weights(facets, w).map(move |(weight, m)| (share * weight, w, m))
     })
 }

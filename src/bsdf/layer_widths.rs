@@ -1,6 +1,6 @@
 //! The slope widths of a coat and of the metal beneath for which there are tables.
 
-use super::anisotropic_table::{WidthRange, place_between};
+use super::anisotropic_table::{NodesBeside, WidthRange};
 use super::microfacets::Microfacets;
 use crate::scene::Distribution;
 
@@ -26,6 +26,17 @@ impl LayerWidths {
             Self::Anisotropic(ranges) => ranges.iter().filter(|range| **range == WidthRange::Textured).count(),
         }
     }
+}
+
+/// Something by its number, and how much it counts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weighed {
+    pub(super) index: usize,
+    pub(super) weight: f32,
+}
+
+impl Weighed {
+    pub(super) const NOTHING: Self = Self { index: 0, weight: 0.0 };
 }
 
 /// The widths of one layer for which there are tables.
@@ -73,20 +84,22 @@ impl WidthNodes {
     }
 
     /// The nodes beside such facets and how much each counts.
-    pub(super) fn place(&self, facets: &Microfacets) -> [(usize, f32); 4] {
+    pub(super) fn beside(&self, facets: &Microfacets) -> [Weighed; 4] {
         if !self.is_anisotropic() {
-            let (low, high, fraction) = place_between(facets.mean_alpha(), self.along.0.len());
-            return [(low, 1.0 - fraction), (high, fraction), (0, 0.0), (0, 0.0)];
+            let NodesBeside { low, high, fraction } = NodesBeside::of(facets.mean_alpha(), self.along.0.len());
+            let (low, high) =
+                (Weighed { index: low, weight: 1.0 - fraction }, Weighed { index: high, weight: fraction });
+            return [low, high, Weighed::NOTHING, Weighed::NOTHING];
         }
         let [alpha_x, alpha_y] = facets.alphas();
         let along_y = self.count_along_y();
-        let (x_low, x_high, x) = place_between(alpha_x, self.along.0.len());
-        let (y_low, y_high, y) = place_between(alpha_y, along_y);
+        let x = NodesBeside::of(alpha_x, self.along.0.len());
+        let y = NodesBeside::of(alpha_y, along_y);
         [
-            (x_low * along_y + y_low, (1.0 - x) * (1.0 - y)),
-            (x_low * along_y + y_high, (1.0 - x) * y),
-            (x_high * along_y + y_low, x * (1.0 - y)),
-            (x_high * along_y + y_high, x * y),
+            Weighed { index: x.low * along_y + y.low, weight: (1.0 - x.fraction) * (1.0 - y.fraction) },
+            Weighed { index: x.low * along_y + y.high, weight: (1.0 - x.fraction) * y.fraction },
+            Weighed { index: x.high * along_y + y.low, weight: x.fraction * (1.0 - y.fraction) },
+            Weighed { index: x.high * along_y + y.high, weight: x.fraction * y.fraction },
         ]
     }
 }

@@ -39,6 +39,7 @@ mod mirror;
 mod mix;
 mod oren_nayar;
 mod phong;
+mod sheen;
 #[cfg(test)]
 mod tests;
 mod thin_dielectric;
@@ -51,7 +52,7 @@ use glam::Vec3;
 pub use anisotropic_table::{AnisotropicTable, WidthRange};
 pub use coat::CoatTables;
 pub use coated_conductor::CoatedConductor;
-pub use coated_diffuse::CoatedDiffuse;
+pub use coated_diffuse::{CoatedDiffuse, Saturation};
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use dielectric_tables::DielectricTables;
@@ -234,7 +235,7 @@ impl<'a> Bsdf<'a> {
 
     /// Clear coat, of the tables' index, over a diffuse base of albedo `reflectance`.
     pub fn coated_diffuse(reflectance: Vec3, facets: impl Into<Microfacets>, tables: &'a CoatTables) -> Self {
-        Self::CoatedDiffuse(CoatedDiffuse::new(reflectance, facets.into(), true, tables))
+        Self::CoatedDiffuse(CoatedDiffuse::new(reflectance, facets.into(), Saturation::Repeated, tables))
     }
 
     /// Clear coat, of the tables' index, over a metal.

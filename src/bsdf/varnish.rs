@@ -11,20 +11,17 @@
 //! A coat may be smooth over bumps: then it has a frame of its own, and what is on the one side of it and on the other of what lies
 //! beneath passes nothing.
 //!
-//! Sources: Khronos Group, KHR_materials_clearcoat and KHR_materials_sheen; A. Estevez & C. Kulla, *Production friendly
-//! microfacet sheen BRDF* (2017), eq. 2, for the fibres' distribution; D. Neubelt & M. Pettineo (2013) for their visibility
-//! 1/(4(cos θo + cos θi − cos θo cos θi)), with which fibres of roughness below 0.5 reflect more than comes in at grazing
-//! angles, and are scaled down by as much.
+//! Source: Khronos Group, KHR_materials_clearcoat. The fibres are in [`super::sheen`].
 
-use super::albedo_table::{AlbedoTable, direction_at};
+use super::albedo_table::direction_at;
 use super::coat::{Coat, CoatTables};
 use super::metal_roughness::MetalRoughness;
 use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
+use super::sheen::Sheen;
 use super::{Bsdf, BsdfEvaluation, BsdfSample, fresnel, turn, warp};
 use crate::scene::Distribution;
 use glam::{Mat3, Vec3};
-use std::f32::consts::TAU;
 use std::sync::LazyLock;
 
 static COAT: LazyLock<CoatTables> = LazyLock::new(|| CoatTables::new(1.5, Distribution::Ggx));
@@ -81,75 +78,8 @@ pub struct Varnish<'a> {
     sheen: Option<Sheen>,
 }
 
-/// Fibres of one roughness.
-#[derive(Clone, Copy, Debug)]
-struct Sheen {
-    color: Vec3,
-    roughness: f32,
-    inverse_alpha: f32,
-    /// 1, or less where fibres would reflect more than comes in.
-    scale: f32,
-    passes: f32,
-}
-
 /// The base is sampled with at least this share of what passes the coat: the weight of what it gives stays bounded.
 const LEAST_OF_BASE: f32 = 0.05;
-
-/// Exponents beyond 1/this would crowd at grazing angles only.
-const SMALLEST_ALPHA: f32 = 0.01;
-
-fn inverse_alpha(alpha: f32) -> f32 {
-    1.0 / alpha.max(SMALLEST_ALPHA)
-}
-
-/// Charlie's distribution and Neubelt's visibility, cosine of `wi` included.
-fn fibres(wo: Vec3, wi: Vec3, inverse_alpha: f32) -> f32 {
-    let half = (wo + wi).normalize_or(Vec3::Z);
-    let sin2 = (1.0 - half.z * half.z).max(0.0);
-    let density = (2.0 + inverse_alpha) * sin2.powf(0.5 * inverse_alpha) / TAU;
-    density * wi.z / (4.0 * (wo.z + wi.z - wo.z * wi.z))
-}
-
-/// Albedo of white fibres, by the midpoint rule over cosine and azimuth.
-static SHEEN: LazyLock<AlbedoTable> = LazyLock::new(|| {
-    AlbedoTable::new(|mu, alpha| {
-        const STEPS: usize = 32;
-        let wo = direction_at(mu);
-        let inverse_alpha = inverse_alpha(alpha);
-        let mut sum = 0.0;
-        for row in 0..STEPS {
-            // Squared, because fibres shine where light grazes.
-            let root = (row as f32 + 0.5) / STEPS as f32;
-            let cos = root * root;
-            let sin = (1.0 - cos * cos).sqrt();
-            for column in 0..STEPS {
-                let (y, x) = (0.5 * TAU * (column as f32 + 0.5) / STEPS as f32).sin_cos();
-                sum += 2.0 * root * fibres(wo, Vec3::new(sin * x, sin * y, cos), inverse_alpha);
-            }
-        }
-        sum * TAU / (STEPS * STEPS) as f32
-    })
-});
-
-impl Sheen {
-    fn new(color: Vec3, roughness: f32) -> Self {
-        let roughness = roughness.clamp(0.0, 1.0);
-        let curve = SHEEN.curve(roughness);
-        // Least where light grazes most, which is where fibres reflect most; a hair more for quadrature.
-        let most = curve.at(f32::MIN_POSITIVE) * 1.02;
-        let scale = 1.0 / most.max(1.0);
-        let passes = 1.0 - color.max_element() * scale * curve.at(1.0);
-        Self { color, roughness, inverse_alpha: inverse_alpha(roughness * roughness), scale, passes }
-    }
-
-    fn albedo(&self, w: Vec3) -> f32 {
-        (self.scale * SHEEN.curve(self.roughness).at(w.z)).clamp(0.0, 1.0)
-    }
-
-    fn passed(&self, w: Vec3) -> f32 {
-        1.0 - self.color.max_element() * self.albedo(w)
-    }
-}
 
 /// A coat of index 1.5.
 fn coat_of(roughness: f32) -> Coat<'static> {
@@ -307,7 +237,7 @@ impl<'a> Varnish<'a> {
         if wi.by_coat.z > 0.0 {
             if let Some(sheen) = self.sheen.as_ref().filter(|_| reaches_base) {
                 let coat = self.coat_passed(&wo) * self.coat_passed(&wi) / self.coat_passes;
-                value += sheen.color * (sheen.scale * coat * fibres(wo.by_base, wi.by_base, sheen.inverse_alpha));
+                value += sheen.scattered(coat, wo.by_base, wi.by_base);
                 pdf += sheen_share * warp::cosine_hemisphere_pdf(wi.by_base.z);
             }
             if let Some(facets) = &self.coat.facets {
@@ -408,19 +338,5 @@ impl<'a> Varnish<'a> {
             Some(sheen) => (sheen.color * sheen.albedo(up.by_base), sheen.passed(up.by_base)),
         };
         Vec3::splat(1.0 - passed) + passed * (sheen + left * self.base.albedo(up.by_base))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// All were scaled down by 1.02, which is for those that reflect more than comes in.
-    #[test]
-    fn fibres_are_scaled_down_only_where_they_reflect_more_than_comes_in() {
-        for (roughness, is_scaled) in [(0.2, true), (0.3, true), (0.7, false), (1.0, false)] {
-            let scale = Sheen::new(Vec3::ONE, roughness).scale;
-            assert_eq!(scale < 1.0, is_scaled, "roughness {roughness}: {scale}");
-        }
     }
 }

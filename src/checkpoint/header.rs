@@ -66,9 +66,51 @@ pub struct Origin {
 }
 
 impl Origin {
+    /// Of a render.
+    pub fn of(scene: &Scene, settings: &TraceSettings) -> Self {
+        let Crop { width, height, .. } = settings.film_area();
+        Self {
+            program: PROGRAM.to_owned(),
+            scene_name: scene.name.clone(),
+            scene: content_hash(scene),
+            width,
+            height,
+            tracing: Tracing::of(settings),
+        }
+    }
+
     /// Pixels of the film; `None` where a file says that it has more than can be numbered.
     pub fn pixels(&self) -> Option<u32> {
         self.width.checked_mul(self.height)
+    }
+
+    /// Where the film lies in the whole picture, if it is a crop of it.
+    pub fn part_of(&self) -> Option<PartOf> {
+        PartOf::of(self.tracing.settings())
+    }
+
+    /// What keeps a film from standing beside one of `own` origin; `None` if nothing does.
+    pub fn difference(&self, own: &Origin) -> Option<String> {
+        if self.program != own.program {
+            return Some(format!("it was written by {}, and this is {}", self.program, own.program));
+        }
+        if self.scene != own.scene {
+            return Some(format!(
+                "it holds another scene (\"{}\", content {}) than \"{}\", content {}: the scene file, a mesh or a texture \
+                 has changed, or what --camera, --look-at, --at, --environment or --nits-per-unit say of it",
+                self.scene_name, self.scene, own.scene_name, own.scene
+            ));
+        }
+        if (self.width, self.height) != (own.width, own.height) {
+            return Some(format!(
+                "it holds a picture of {}x{} pixels, not of {}x{}",
+                self.width, self.height, own.width, own.height
+            ));
+        }
+        (self.tracing != own.tracing).then(|| {
+            let [its, this] = [self.tracing.otherwise_than(&own.tracing), own.tracing.otherwise_than(&self.tracing)];
+            format!("its samples were traced with {its}, and these are with {this}")
+        })
     }
 }
 
@@ -128,50 +170,6 @@ pub struct UnknownName {
     kind: &'static str,
     name: String,
     known: String,
-}
-
-impl Origin {
-    /// Of a render.
-    pub fn of(scene: &Scene, settings: &TraceSettings) -> Self {
-        let Crop { width, height, .. } = settings.film_area();
-        Self {
-            program: PROGRAM.to_owned(),
-            scene_name: scene.name.clone(),
-            scene: content_hash(scene),
-            width,
-            height,
-            tracing: Tracing::of(settings),
-        }
-    }
-
-    /// Where the film lies in the whole picture, if it is a crop of it.
-    pub fn part_of(&self) -> Option<PartOf> {
-        PartOf::of(self.tracing.settings())
-    }
-
-    /// What keeps a film from standing beside one of `own` origin; `None` if nothing does.
-    pub fn difference(&self, own: &Origin) -> Option<String> {
-        if self.program != own.program {
-            return Some(format!("it was written by {}, and this is {}", self.program, own.program));
-        }
-        if self.scene != own.scene {
-            return Some(format!(
-                "it holds another scene (\"{}\", content {}) than \"{}\", content {}: the scene file, a mesh or a texture \
-                 has changed, or what --camera, --look-at, --at, --environment or --nits-per-unit say of it",
-                self.scene_name, self.scene, own.scene_name, own.scene
-            ));
-        }
-        if (self.width, self.height) != (own.width, own.height) {
-            return Some(format!(
-                "it holds a picture of {}x{} pixels, not of {}x{}",
-                self.width, self.height, own.width, own.height
-            ));
-        }
-        (self.tracing != own.tracing).then(|| {
-            let [its, this] = [self.tracing.otherwise_than(&own.tracing), own.tracing.otherwise_than(&self.tracing)];
-            format!("its samples were traced with {its}, and these are with {this}")
-        })
-    }
 }
 
 impl Seeds {

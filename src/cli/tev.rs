@@ -5,7 +5,7 @@ use clap::Args;
 use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::state::RenderState;
 use fechner::poison::Unpoisoned as _;
-use fechner::preview::{Looked, Shown, TEV_PORT, Tev};
+use fechner::preview::{Looked, Shown, Stage, TEV_PORT, Tev};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::sync::{Mutex, MutexGuard};
 
@@ -72,16 +72,16 @@ impl Showing {
     pub(super) fn between_batches(&self, state: &RenderState) {
         let mut moving = self.moving();
         if moving.tev.is_due() {
-            self.show(&mut moving, state, false);
+            self.show(&mut moving, state, Stage::UnderWay);
         }
     }
 
     /// At the end.
     pub(super) fn ended(&self, state: &RenderState) {
-        self.show(&mut self.moving(), state, true);
+        self.show(&mut self.moving(), state, Stage::AtRest);
     }
 
-    fn show(&self, moving: &mut Moving, state: &RenderState, is_at_rest: bool) {
+    fn show(&self, moving: &mut Moving, state: &RenderState, stage: Stage) {
         let Moving { tev, looked } = moving;
         let (film, nits_per_unit) = (&state.film, self.nits_per_unit);
         let raw = || {
@@ -91,7 +91,7 @@ impl Showing {
         // Denoised pictures are made by looks; between two the last one stays.
         let rgb_cd_m2: Vec<[f32; 3]> = looked.as_ref().and_then(|looked| looked.denoised.clone()).unwrap_or_else(raw);
         let looked = looked.as_ref();
-        tev.offer(&Shown { film, rgb_cd_m2: &rgb_cd_m2, step: 1, looked, nits_per_unit, is_at_rest });
+        tev.offer(&Shown { film, rgb_cd_m2: &rgb_cd_m2, step: 1, looked, nits_per_unit, stage });
     }
 }
 

@@ -64,13 +64,15 @@ const VARIANCE_OF_A_LONE_SAMPLE: f32 = 0.125;
 
 /// What the denoiser is told of the variance of the picture, (cd/m²)².
 fn told_variance(film: &Film, estimate: &Estimate) -> Plane {
-    Plane::from_fn(film.width() as usize, film.height() as usize, |x, y| {
-        let own = estimate.variance_of_mean.get(x, y);
-        match film.halves(y * film.width() as usize + x) {
+    let [own, half_difference, luminance] =
+        [&estimate.variance_of_mean, &estimate.half_difference, &estimate.luminance_cd_m2].map(Plane::values);
+    film.plane(|pixel| {
+        let own = own[pixel];
+        match film.halves(pixel) {
             // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ by.
-            Halves::Both(_) => 0.5 * (own + estimate.half_difference.get(x, y).powi(2)),
+            Halves::Both(_) => 0.5 * (own + half_difference[pixel].powi(2)),
             Halves::Only(only) if only.samples > 1 => own,
-            Halves::Only(_) => VARIANCE_OF_A_LONE_SAMPLE * estimate.luminance_cd_m2.get(x, y).powi(2),
+            Halves::Only(_) => VARIANCE_OF_A_LONE_SAMPLE * luminance[pixel].powi(2),
         }
     })
 }
@@ -126,29 +128,20 @@ fn mean_cd_m2(pixel: &HalfPixel, nits_per_unit: f64) -> [f32; 3] {
 mod tests {
     use super::*;
     use crate::denoise::DenoiserKind;
-    use crate::film::BlockSum;
+    use crate::film::{BlockSum, film_of_samples};
     use crate::integrator::{BlockWork, FirstHit, PathSample};
     use crate::sampler::{hash_words, unit_of_hash};
 
     const SIDE: u32 = 48;
 
-    /// A film of so many samples in each half of a pixel, which are made of the pixel, the half and the sample's number.
-    fn film_of(samples: u32, mut sample: impl FnMut(u32, Half, u32) -> PathSample) -> Film {
-        let mut film = Film::new(SIDE, SIDE);
-        for pixel in 0..SIDE * SIDE {
-            for half in Half::BOTH {
-                let mut sum = BlockSum::default();
-                (0..samples).for_each(|index| sum.add(&sample(pixel, half, index)));
-                film.merge_block(BlockWork { half, ..BlockWork::whole(pixel, half, 0) }, &sum);
-            }
-        }
-        film
+    /// A film of so many samples in each half of every pixel.
+    fn film_of(samples: u32, sample: impl FnMut(u32, Half, u32) -> PathSample) -> Film {
+        film_of_samples([SIDE; 2], [samples; 2], sample)
     }
 
     /// A sample that met a wall.
     fn of_wall(albedo: Vec3, radiance: Vec3) -> PathSample {
-        let first_hit = FirstHit { albedo, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
-        PathSample { radiance, first_hit, rays: 1 }
+        PathSample { radiance, first_hit: FirstHit { albedo, ..FirstHit::WALL }, rays: 1 }
     }
 
     /// A wall of radiance 1 with noise, and before it a lamp two pixels wide that is 10000 times as bright, whose edges cover pixels

@@ -35,13 +35,10 @@ impl Film {
 
     /// The picture so far. `nits_per_unit`: luminance in cd/m² of RGB (1, 1, 1).
     pub fn estimate(&self, nits_per_unit: f64) -> Estimate {
-        let (width, height) = (self.width() as usize, self.height() as usize);
-        let plane = |value: &(dyn Fn(Halves<'_>) -> f64 + Sync)| {
-            Plane::from_fn(width, height, |x, y| value(self.halves(y * width + x)) as f32)
-        };
+        let plane = |value: &(dyn Fn(Halves<'_>) -> f64 + Sync)| self.plane(|pixel| value(self.halves(pixel)) as f32);
         let nits = nits_per_unit;
         Estimate {
-            rgb_cd_m2: (0..width * height).map(|pixel| self.rgb_cd_m2(pixel, nits)).collect(),
+            rgb_cd_m2: (0..self.pixel_count()).map(|pixel| self.rgb_cd_m2(pixel, nits)).collect(),
             luminance_cd_m2: plane(&|halves| nits * halves.mean(HalfPixel::luminance)),
             variance_of_mean: plane(&|halves| nits * nits * halves.variance_of_mean(0)),
             half_difference: plane(&|halves| nits * halves.half_difference(HalfPixel::luminance)),

@@ -23,7 +23,9 @@ impl PixelGuide {
         if let (0, Some(id)) = (before, block.first_object_id) {
             self.seen = self.seen.with_object(id);
         }
-        self.seen = self.seen.with(block.shines);
+        if block.shines {
+            self.seen = self.seen.shining();
+        }
         if block.samples > 0 {
             let share = block.samples as f32 / (before + block.samples) as f32;
             let scale = 1.0 / block.samples as f32;
@@ -46,7 +48,9 @@ impl PixelGuide {
             self.albedo.iter_mut().zip(other.albedo).for_each(|(old, new)| blend(old, new));
             self.normal.iter_mut().zip(other.normal).for_each(|(old, new)| blend(old, new));
             blend(&mut self.depth, other.depth);
-            self.seen = self.seen.with(other.seen.shines());
+            if other.seen.shines() {
+                self.seen = self.seen.shining();
+            }
         }
     }
 
@@ -85,7 +89,7 @@ impl Seen {
         Self(self.0 & Self::SHINES | id & !Self::SHINES)
     }
 
-    pub(super) fn with(self, shines: bool) -> Self {
-        if shines { Self(self.0 | Self::SHINES) } else { self }
+    fn shining(self) -> Self {
+        Self(self.0 | Self::SHINES)
     }
 }

@@ -9,6 +9,8 @@ mod guide;
 mod halves;
 mod known_lamps;
 mod merge;
+#[cfg(test)]
+mod of_samples;
 mod over;
 
 pub use block_sum::BlockSum;
@@ -16,9 +18,12 @@ pub use estimate::Estimate;
 pub use guide::{PixelGuide, Seen};
 pub use halves::{Halves, share_of_mean};
 pub use known_lamps::KnownLamps;
+#[cfg(test)]
+pub(crate) use of_samples::film_of_samples;
 
 use crate::integrator::BlockWork;
 use crate::sampler::Half;
+use fechner_perception::Plane;
 use fechner_perception::opponent::OPPONENT_OF_RGB;
 use serde::{Deserialize, Serialize};
 
@@ -137,6 +142,12 @@ impl Film {
         self.guides.len()
     }
 
+    /// A value of each pixel, asked for by its number, rows in parallel.
+    pub(crate) fn plane(&self, of: impl Fn(usize) -> f32 + Sync) -> Plane {
+        let width = self.width as usize;
+        Plane::from_fn(width, self.height as usize, |x, y| of(y * width + x))
+    }
+
     /// One half, row-major.
     pub fn half(&self, half: Half) -> &[HalfPixel] {
         &self.halves[half.index()]
@@ -211,7 +222,7 @@ mod tests {
     use glam::Vec3;
 
     fn sample(radiance: f32) -> PathSample {
-        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 2.0, object_id: 1, shines: false };
+        let first_hit = FirstHit { depth: 2.0, ..FirstHit::WALL };
         PathSample { radiance: Vec3::splat(radiance), first_hit, rays: 1 }
     }
 
@@ -296,8 +307,7 @@ mod tests {
         let sum = |albedo: f32, depth: f32, samples: u32| {
             let mut sum = BlockSum::default();
             for _ in 0..samples {
-                let first_hit =
-                    FirstHit { albedo: Vec3::splat(albedo), normal: Vec3::Z, depth, object_id: 1, shines: false };
+                let first_hit = FirstHit { albedo: Vec3::splat(albedo), depth, ..FirstHit::WALL };
                 sum.add(&PathSample { radiance: Vec3::ONE, first_hit, rays: 1 });
             }
             sum

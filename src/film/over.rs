@@ -56,7 +56,7 @@ mod tests {
         let mut sum = BlockSum::default();
         for sample in samples {
             let object_id = u32::from(sample.is_some());
-            let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id, shines: false };
+            let first_hit = FirstHit { object_id, ..FirstHit::WALL };
             sum.add(&PathSample { radiance: Vec3::splat(sample.unwrap_or(0.0)), first_hit, rays: 1 });
         }
         let mut film = Film::new(1, 1);

@@ -19,7 +19,7 @@ mod world;
 pub(crate) use face::Face;
 pub(crate) use simd::{VectorWork, prefetch, with_vectors};
 pub use surface::SurfacePoint;
-pub use world::{Hit, World};
+pub use world::{Ball, Hit, World};
 
 use glam::Vec3A;
 

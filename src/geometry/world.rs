@@ -9,13 +9,12 @@ mod build;
 mod tests;
 
 use super::mesh_tree::{MeshHit, MeshTree};
-use super::tree::{BinaryTree, Bounds};
+use super::tree::BinaryTree;
 use super::wide_tree::TriangleRef;
 use super::{Coverage, Ray, sphere};
 use crate::sampler::{hash_words, unit_of_hash};
-use crate::scene::{Alpha, Instance, MaterialId, ScalarInput, Scene, SpherePlace};
+use crate::scene::{Alpha, Material, MaterialId, ScalarInput, Scene, SpherePlace};
 use at_hit::{Placement, interpolate_uv};
-use build::{Around, MOST_VERTICES, fixed_triangles, own_triangles, placed_bounds, swept_bounds};
 use glam::{Affine3A, Vec2, Vec3, Vec3A};
 use std::sync::Arc;
 
@@ -42,6 +41,15 @@ impl Hit {
     }
 }
 
+/// A sphere in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Its centre.
+    pub center: Vec3,
+    /// Its radius, above 0.
+    pub radius: f32,
+}
+
 /// A scene with its trees.
 pub struct World {
     scene: Arc<Scene>,
@@ -49,19 +57,14 @@ pub struct World {
     fixed: MeshTree,
     /// Trees of meshes that are placed several times.
     shared: Vec<MeshTree>,
-    /// Over `items`, when they are more than [`FEW`].
+    /// Over `items`, where they are many.
     top: Option<BinaryTree>,
     items: Vec<Item>,
-    center: Vec3,
-    /// Of the sphere around everything.
-    radius: f32,
+    around: Ball,
     has_alpha: bool,
     /// By instance.
     placements: Vec<Placement>,
 }
-
-/// Up to so many items are tested one after the other: a walk costs more than it saves.
-const FEW: usize = 4;
 
 /// What a leaf of the top tree holds.
 #[derive(Debug)]
@@ -88,35 +91,14 @@ enum Item {
 }
 
 impl World {
-    /// Builds the trees. Deterministic for any number of threads.
-    pub fn new(scene: Arc<Scene>) -> Self {
-        let uses = count_uses(&scene);
-        let fixed = MeshTree::build(&fixed_triangles(&scene, &uses));
-        let mut items = BoundedItems::default();
-        if fixed.bounds().is_finite() {
-            items.push(Item::Fixed, fixed.bounds());
-        }
-        let shared = place_instances(&scene, &uses, &mut items);
-        place_spheres(&scene, &mut items);
-        let (center, radius) = sphere_around(&items.bounds);
-        let (top, items) = arranged(items);
-        let has_alpha = scene.materials.iter().any(|m| m.alpha != Alpha::Opaque);
-        let placements = scene
-            .instances
-            .iter()
-            .map(|i| Placement::new(&scene, i, shared.of_mesh[i.mesh.0 as usize].map(|tree| tree as u32)))
-            .collect();
-        Self { scene, fixed, shared: shared.trees, top, items, center, radius, has_alpha, placements }
-    }
-
     /// The scene that this was built from.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// Centre of the bounding box and radius of the sphere around it; a unit sphere for an empty scene.
-    pub fn bounding_sphere(&self) -> (Vec3, f32) {
-        (self.center, self.radius)
+    /// The sphere around the bounding box; a unit sphere for an empty scene.
+    pub fn bounding_sphere(&self) -> Ball {
+        self.around
     }
 
     /// Triangles that were left out because they have no area.
@@ -129,13 +111,18 @@ impl World {
         self.fixed.bytes() + self.shared.iter().map(MeshTree::bytes).sum::<usize>()
     }
 
-    /// The material of an object.
+    /// The number of the material of an object.
     pub fn material_of(&self, object: u32) -> MaterialId {
         let instances = self.scene.instances.len();
         match self.scene.instances.get(object as usize) {
             Some(instance) => instance.material,
             None => self.scene.spheres[object as usize - instances].material,
         }
+    }
+
+    /// What an object is made of.
+    pub fn material(&self, object: u32) -> &Material {
+        &self.scene.materials[self.material_of(object).0 as usize]
     }
 
     /// The closest surface along the ray.
@@ -292,7 +279,7 @@ impl World {
 
     fn covers(&self, part: Part, ray: &Ray, uv: impl Fn() -> Vec2) -> bool {
         let coverage = |value: &ScalarInput| value.evaluate(&self.scene.textures, uv());
-        match &self.scene.materials[self.material_of(part.object).0 as usize].alpha {
+        match &self.material(part.object).alpha {
             Alpha::Opaque => true,
             Alpha::Unseen => false,
             Alpha::Mask { value, cutoff } => coverage(value) >= *cutoff,
@@ -317,103 +304,6 @@ impl LocalRay {
         let length = direction.length();
         Self { origin: to_mesh.transform_point3a(ray.origin), direction: direction / length, length }
     }
-}
-
-/// Items of the top level, each with what holds it.
-#[derive(Default)]
-struct BoundedItems {
-    items: Vec<Item>,
-    bounds: Vec<Bounds>,
-}
-
-impl BoundedItems {
-    fn push(&mut self, item: Item, bounds: Bounds) {
-        self.items.push(item);
-        self.bounds.push(bounds);
-    }
-}
-
-/// The trees of meshes that are placed several times, and which one a mesh has.
-struct SharedTrees {
-    trees: Vec<MeshTree>,
-    of_mesh: Vec<Option<usize>>,
-}
-
-/// How often each mesh is placed. What moves cannot be put into world space and counts twice.
-fn count_uses(scene: &Scene) -> Vec<u32> {
-    let mut uses = vec![0u32; scene.meshes.len()];
-    for instance in &scene.instances {
-        uses[instance.mesh.0 as usize] += if instance.motion.is_some() { 2 } else { 1 };
-    }
-    uses
-}
-
-/// Adds the instances of meshes that are used more than once, and builds the trees of those.
-fn place_instances(scene: &Scene, uses: &[u32], items: &mut BoundedItems) -> SharedTrees {
-    let is_placed = |instance: &&Instance| uses[instance.mesh.0 as usize] >= 2 && instance.motion.is_none();
-    let vertices = |instance: &Instance| scene.meshes[instance.mesh.0 as usize].positions.len();
-    let all_vertices = scene.instances.iter().filter(is_placed).map(vertices).sum::<usize>();
-    let around = if all_vertices <= MOST_VERTICES { Around::Vertices } else { Around::OwnBox };
-    let mut trees: Vec<MeshTree> = Vec::new();
-    let mut of_mesh = vec![None; scene.meshes.len()];
-    for (number, instance) in scene.instances.iter().enumerate() {
-        let mesh = instance.mesh.0 as usize;
-        if uses[mesh] < 2 {
-            continue;
-        }
-        let shared = *of_mesh[mesh].get_or_insert_with(|| {
-            trees.push(MeshTree::build(&own_triangles(scene, mesh)));
-            trees.len() - 1
-        });
-        let bounds = trees[shared].bounds();
-        if !bounds.is_finite() {
-            continue;
-        }
-        let number = number as u32;
-        match &instance.motion {
-            Some(motion) => items.push(Item::Moving { instance: number, shared }, swept_bounds(motion, bounds)),
-            None => {
-                let to_mesh = instance.to_world.inverse();
-                let placed = placed_bounds(scene, instance, bounds, around);
-                items.push(Item::Placed { instance: number, shared, to_mesh }, placed);
-            }
-        }
-    }
-    SharedTrees { trees, of_mesh }
-}
-
-fn place_spheres(scene: &Scene, items: &mut BoundedItems) {
-    for (number, sphere) in scene.spheres.iter().enumerate() {
-        let (center, radius) = (Vec3A::from(sphere.center), sphere.radius);
-        let object = (scene.instances.len() + number) as u32;
-        let bounds = Bounds { min: center - radius, max: center + radius };
-        match &sphere.motion {
-            Some(motion) => items.push(Item::MovingSphere { object }, swept_bounds(motion, bounds)),
-            None => items.push(Item::Sphere { object, center, radius }, bounds),
-        }
-    }
-}
-
-/// Centre and radius of the sphere around the box around everything; a unit sphere where there is nothing.
-fn sphere_around(bounds: &[Bounds]) -> (Vec3, f32) {
-    let bounds = bounds.iter().fold(Bounds::EMPTY, |all, b| all.union(*b));
-    if !bounds.is_finite() {
-        return (Vec3::ZERO, 1.0);
-    }
-    let center = (bounds.min + bounds.max) * 0.5;
-    (center.into(), (bounds.max - center).length().max(f32::MIN_POSITIVE))
-}
-
-/// Items in the order in which they are met, with a tree over them where they are many; those without a finite box are left out.
-fn arranged(BoundedItems { items, bounds }: BoundedItems) -> (Option<BinaryTree>, Vec<Item>) {
-    if items.len() <= FEW {
-        let finite = items.into_iter().zip(bounds).filter(|(_, bounds)| bounds.is_finite());
-        return (None, finite.map(|(item, _)| item).collect());
-    }
-    let tree = BinaryTree::build(&bounds);
-    let mut slots: Vec<Option<Item>> = items.into_iter().map(Some).collect();
-    let ordered = tree.order().iter().filter_map(|&i| slots[i as usize].take()).collect();
-    (Some(tree), ordered)
 }
 
 /// A triangle of an object, or the near or far side of a sphere.

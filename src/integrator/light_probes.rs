@@ -89,11 +89,11 @@ impl PathTracer {
 
     /// Share of a light's sample that gets to a place.
     fn arrival(&self, place: &Place, sample: &LightSample) -> f32 {
-        let (ray, distance) = self.shadow_ray(&place.point, sample, place.probe.time);
+        let shadow_ray = self.shadow_ray(&place.point, sample, place.probe.time);
         if self.has_sheets {
-            return self.through_sheets(&ray, distance, MOST_SHEETS).0.max_element().min(1.0);
+            return self.through_sheets(&shadow_ray, MOST_SHEETS).share.max_element().min(1.0);
         }
-        if distance > 0.0 && self.world.occluded(&ray, distance) { 0.0 } else { 1.0 }
+        if self.is_hidden(&shadow_ray) { 0.0 } else { 1.0 }
     }
 }
 

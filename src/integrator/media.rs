@@ -36,6 +36,11 @@ impl Medium {
         surface.interior_absorption().map(|absorption| Self { material, absorption })
     }
 
+    /// Its boundary, crossed from its front.
+    fn entered(self) -> Crossed {
+        Crossed { medium: self, crossing: Crossing::In }
+    }
+
     /// Share of light that is left after a distance, which may be infinite.
     fn transmittance(&self, distance: f32) -> Vec3 {
         // 0 · ∞ is no number: what does not absorb lets everything through.
@@ -60,9 +65,17 @@ pub(super) enum Crossing {
     Out,
 }
 
+/// A boundary that a path crosses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Crossed {
+    /// Behind it.
+    pub(super) medium: Medium,
+    pub(super) crossing: Crossing,
+}
+
 impl Media {
     /// Crosses the boundary of a volume.
-    pub(super) fn cross(&mut self, medium: Medium, crossing: Crossing) {
+    pub(super) fn cross(&mut self, Crossed { medium, crossing }: Crossed) {
         match crossing {
             Crossing::In if self.count < DEEPEST => {
                 self.entered[self.count] = Some(medium);
@@ -100,7 +113,7 @@ impl Media {
         // Of equals the ray that was given stands.
         let most = said.iter().rev().max_by_key(|media| agreeing(media));
         let mut media = Self::default();
-        most.into_iter().flatten().for_each(|medium| media.cross(*medium, Crossing::In));
+        most.into_iter().flatten().for_each(|medium| media.cross(medium.entered()));
         media
     }
 
@@ -114,7 +127,7 @@ impl Media {
             let point = world.surface(&ray, &hit);
             let material = world.material_of(hit.object);
             let direction = Vec3::from(ray.direction);
-            if let Some(medium) = Medium::behind(material, &world.scene().materials[material.0 as usize].surface) {
+            if let Some(medium) = Medium::behind(material, &world.material(hit.object).surface) {
                 if direction.dot(point.geometric_normal) < 0.0 {
                     entered.push(material);
                 } else if let Some(place) = entered.iter().rposition(|own| *own == material) {
@@ -154,18 +167,22 @@ mod tests {
         Medium { material: MaterialId(material), absorption: Vec3::splat(absorption) }
     }
 
+    fn left(medium: Medium) -> Crossed {
+        Crossed { medium, crossing: Crossing::Out }
+    }
+
     #[test]
     fn the_innermost_volume_absorbs() {
         let (glass, wine) = (medium(0, 1.0), medium(1, 3.0));
         let mut media = Media::default();
         assert_eq!(media.transmittance(f32::INFINITY), Vec3::ONE);
-        media.cross(glass, Crossing::In);
-        media.cross(wine, Crossing::In);
+        media.cross(glass.entered());
+        media.cross(wine.entered());
         assert_eq!(media.transmittance(1.0), Vec3::splat((-3.0f32).exp()));
         // Out of the outer one first, as where two volumes overlap.
-        media.cross(glass, Crossing::Out);
+        media.cross(left(glass));
         assert_eq!(media.transmittance(1.0), Vec3::splat((-3.0f32).exp()));
-        media.cross(wine, Crossing::Out);
+        media.cross(left(wine));
         assert_eq!(media.transmittance(1.0), Vec3::ONE);
     }
 
@@ -174,7 +191,7 @@ mod tests {
         let water = medium(4, 2.0);
         let mut media = Media::default();
         assert_eq!(media.transmittance_to_back_of(water, 0.5), Vec3::splat((-1.0f32).exp()));
-        media.cross(water, Crossing::Out);
+        media.cross(left(water));
         assert_eq!(media.transmittance(0.5), Vec3::ONE);
     }
 
@@ -206,10 +223,10 @@ mod tests {
     fn more_volumes_than_are_told_apart_do_no_harm() {
         let mut media = Media::default();
         for number in 0..20 {
-            media.cross(medium(number, 1.0), Crossing::In);
+            media.cross(medium(number, 1.0).entered());
         }
         for number in 0..20 {
-            media.cross(medium(number, 1.0), Crossing::Out);
+            media.cross(left(medium(number, 1.0)));
         }
         assert_eq!(media.count, 0);
     }

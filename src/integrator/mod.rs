@@ -7,6 +7,7 @@
 
 mod around_camera;
 mod camera;
+mod frames;
 mod light_probes;
 mod media;
 mod path;

@@ -6,7 +6,7 @@
 use super::PathTracer;
 use super::media::Media;
 use super::shading::{Components, Shading};
-use super::thin_sheets::MOST_SHEETS;
+use super::thin_sheets::{MOST_SHEETS, Passed};
 use crate::geometry::{Hit, Ray, SurfacePoint, offset};
 use crate::light::{LightFromAfar, LightReceiver, LightSample, emitted};
 use crate::sampler::Sample;
@@ -31,6 +31,10 @@ pub struct FirstHit {
 impl FirstHit {
     /// No surface.
     pub const NOTHING: Self = Self { albedo: Vec3::ONE, normal: Vec3::ZERO, depth: 0.0, object_id: 0, shines: false };
+
+    /// A white wall that faces the camera, for films that tests make up.
+    #[cfg(test)]
+    pub(crate) const WALL: Self = Self { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
 }
 
 /// What a sample found.
@@ -42,6 +46,14 @@ pub struct PathSample {
     pub first_hit: FirstHit,
     /// Rays traced: camera, bounce and shadow.
     pub rays: u32,
+}
+
+#[cfg(test)]
+impl PathSample {
+    /// One that met [`FirstHit::WALL`].
+    pub(crate) fn of_wall(radiance: Vec3) -> Self {
+        Self { radiance, first_hit: FirstHit::WALL, rays: 1 }
+    }
 }
 
 /// Where a path is.
@@ -86,11 +98,17 @@ pub(super) struct BounceNumbers {
     pub(super) scatter: [f32; 4],
 }
 
+/// From a surface to a light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShadowRay {
+    pub(super) ray: Ray,
+    /// Up to the light, in scene units; may be infinite, and is 0 where there is no way between the two.
+    pub(super) distance: f32,
+}
+
 /// Light that a path gains if nothing is in between.
 struct DirectLight {
-    shadow_ray: Ray,
-    /// Up to the light, in scene units; may be infinite.
-    distance: f32,
+    shadow_ray: ShadowRay,
     /// How many clear sheets it may pass.
     most_sheets: u32,
     /// By the path's throughput.
@@ -187,16 +205,21 @@ impl PathTracer {
     pub(super) fn add_direct_light(&self, path: &mut PathState) {
         let Some(light) = path.direct.take() else { return };
         if light.most_sheets > 0 {
-            let (share, rays) = self.through_sheets(&light.shadow_ray, light.distance, light.most_sheets);
+            let Passed { share, rays } = self.through_sheets(&light.shadow_ray, light.most_sheets);
             path.radiance += share * light.radiance;
             path.rays += rays;
             return;
         }
         path.rays += 1;
-        let is_hidden = light.distance > 0.0 && self.world.occluded(&light.shadow_ray, light.distance);
-        if !is_hidden {
+        if !self.is_hidden(&light.shadow_ray) {
             path.radiance += light.radiance;
         }
+    }
+
+    /// Whether anything is before a light.
+    #[inline]
+    pub(super) fn is_hidden(&self, ShadowRay { ray, distance }: &ShadowRay) -> bool {
+        *distance > 0.0 && self.world.occluded(ray, *distance)
     }
 
     /// Radiance of the environment along a ray that hit nothing.
@@ -214,7 +237,7 @@ impl PathTracer {
     /// Radiance emitted by the surface that was hit; whether there was any.
     fn add_emission(&self, path: &mut PathState, hit: &Hit, point: &SurfacePoint) -> bool {
         let scene = self.world.scene();
-        let material = &scene.materials[self.world.material_of(hit.object).0 as usize];
+        let material = self.world.material(hit.object);
         let cosine = -Vec3::from(path.ray.direction).dot(point.geometric_normal);
         if material.emission.factor == Vec3::ZERO || !(cosine > 0.0 || material.emits_both_sides) {
             return false;
@@ -265,32 +288,32 @@ impl PathTracer {
         let distance = light.place.map_or(f32::INFINITY, |place| place.position.distance(point.position));
         let left = match shading.crossed_medium(wo, wi) {
             None => path.media.transmittance(distance),
-            Some((medium, crossing)) => {
+            Some(crossed) => {
                 let mut media = path.media;
-                media.cross(medium, crossing);
+                media.cross(crossed);
                 media.transmittance(distance)
             }
         };
-        let (shadow_ray, distance) = self.shadow_ray(point, &light, path.ray.time);
+        let shadow_ray = self.shadow_ray(point, &light, path.ray.time);
         let most_sheets = if self.has_sheets { MOST_SHEETS.min(self.settings.max_depth - bounce - 1) } else { 0 };
-        path.direct = Some(DirectLight { shadow_ray, distance, most_sheets, radiance: unshadowed * left / survival });
+        path.direct = Some(DirectLight { shadow_ray, most_sheets, radiance: unshadowed * left / survival });
     }
 
-    /// The ray from a point to a light and how far that is. Both ends are lifted off their surfaces; where that leaves no way
-    /// between them, the distance is 0.
-    pub(super) fn shadow_ray(&self, point: &SurfacePoint, light: &LightSample, time: f32) -> (Ray, f32) {
+    /// The ray from a point to a light. Both ends are lifted off their surfaces.
+    pub(super) fn shadow_ray(&self, point: &SurfacePoint, light: &LightSample, time: f32) -> ShadowRay {
         let origin = point.spawn(light.direction);
+        let along = |direction: Vec3A| Ray { time, ..Ray::new(origin, direction) };
         let Some(place) = light.place else {
-            return (Ray { time, ..Ray::new(origin, light.direction.into()) }, f32::INFINITY);
+            return ShadowRay { ray: along(light.direction.into()), distance: f32::INFINITY };
         };
         let position = Vec3A::from(place.position);
         let offset = place.offset.max(offset::of_way(origin, position - origin));
         let way = position + Vec3A::from(place.normal) * offset - origin;
         if way.dot(light.direction.into()) <= 0.0 {
-            return (Ray { time, ..Ray::new(origin, light.direction.into()) }, 0.0);
+            return ShadowRay { ray: along(light.direction.into()), distance: 0.0 };
         }
         let distance = way.length();
-        (Ray { time, ..Ray::new(origin, way / distance) }, distance)
+        ShadowRay { ray: along(way / distance), distance }
     }
 }
 
@@ -314,8 +337,8 @@ fn scatter(path: &mut PathState, hit: &Hit, point: &SurfacePoint, shading: &Shad
     }
     // Whatever the lobe: what a mix lets through diffusely comes into the volume behind it like what it refracts, and a light
     // sample cannot tell the two apart.
-    if let Some((medium, crossing)) = shading.crossed_medium(wo, wi) {
-        path.media.cross(medium, crossing);
+    if let Some(crossed) = shading.crossed_medium(wo, wi) {
+        path.media.cross(crossed);
     }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
     path.from = shading.receiver(point, wo);

@@ -155,7 +155,7 @@ impl PathTracer {
         if scene.textures.is_empty() {
             return;
         }
-        let material = &scene.materials[self.world.material_of(point.object).0 as usize];
+        let material = self.world.material(point.object);
         let lookup = material.surface.base_color().and_then(|color| color.texture.as_ref());
         let texels = lookup.and_then(|l| scene.textures[l.texture.0 as usize].stored_at(l.transform(point.uv)));
         texels.into_iter().flatten().for_each(prefetch);

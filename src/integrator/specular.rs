@@ -43,6 +43,12 @@ pub struct SpecularPath {
     pub length: f32,
 }
 
+/// What a smooth surface does with a ray.
+struct SpecularBounce {
+    event: SpecularEvent,
+    next: Ray,
+}
+
 impl PathTracer {
     /// Whether any of the scene's surfaces may be perfectly smooth, so that following rays is worth while.
     pub fn has_specular_surfaces(&self) -> bool {
@@ -55,12 +61,12 @@ impl PathTracer {
         let (mut ray, mut length, mut vertices) = (camera_ray, 0.0, SmallVec::new());
         loop {
             let hit = self.world.closest(&ray);
-            let next = hit.as_ref().and_then(|hit| self.specular_event(&ray, hit, None));
+            let next = hit.as_ref().and_then(|hit| self.specular_bounce(&ray, hit, None));
             length += hit.as_ref().map_or(f32::INFINITY, |hit| hit.distance);
             match (hit, next) {
-                (Some(hit), Some((event, next))) if vertices.len() < MOST_VERTICES => {
-                    vertices.push(SpecularVertex { object: hit.object, event });
-                    ray = next;
+                (Some(hit), Some(bounce)) if vertices.len() < MOST_VERTICES => {
+                    vertices.push(SpecularVertex { object: hit.object, event: bounce.event });
+                    ray = bounce.next;
                 }
                 (_, Some(_)) => return None,
                 (end, None) => {
@@ -75,14 +81,14 @@ impl PathTracer {
     pub fn follow_again(&self, camera_ray: Ray, vertices: &[SpecularVertex]) -> Option<Ray> {
         vertices.iter().try_fold(camera_ray, |ray, vertex| {
             let hit = self.world.closest(&ray).filter(|hit| hit.object == vertex.object)?;
-            self.specular_event(&ray, &hit, Some(vertex.event)).map(|(_, next)| next)
+            self.specular_bounce(&ray, &hit, Some(vertex.event)).map(|bounce| bounce.next)
         })
     }
 
     /// What the surface at a hit does with a ray if it is perfectly smooth and does not shine: the event that is asked for, or
     /// the likelier one.
-    fn specular_event(&self, ray: &Ray, hit: &Hit, wanted: Option<SpecularEvent>) -> Option<(SpecularEvent, Ray)> {
-        let material = &self.world.scene().materials[self.world.material_of(hit.object).0 as usize];
+    fn specular_bounce(&self, ray: &Ray, hit: &Hit, wanted: Option<SpecularEvent>) -> Option<SpecularBounce> {
+        let material = self.world.material(hit.object);
         if !may_be_specular(&material.surface) || material.emission.factor != Vec3::ZERO {
             return None;
         }
@@ -103,7 +109,7 @@ impl PathTracer {
             let wi = shading.frame.to_world_direction(scattered.wi);
             let is_wanted = scattered.lobe.is_delta() && wanted.is_none_or(|wanted| wanted == event);
             let next = Ray { origin: point.spawn(wi), direction: wi.into(), ..*ray };
-            (is_wanted && shading.sides_agree(wo, wi)).then_some((event, next))
+            (is_wanted && shading.sides_agree(wo, wi)).then_some(SpecularBounce { event, next })
         })
     }
 }

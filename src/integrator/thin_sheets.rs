@@ -7,6 +7,7 @@
 //! weights: they need only add up to 1. Not for boundaries of volumes, which refract.
 
 use super::PathTracer;
+use super::path::ShadowRay;
 use super::shading::Components;
 use super::specular::may_be_smooth;
 use crate::geometry::Ray;
@@ -42,14 +43,25 @@ fn may_be_a_sheet(surface: &Surface) -> bool {
     }
 }
 
+/// What comes through sheets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Passed {
+    /// Of light; 0 where anything else is in the way.
+    pub(super) share: Vec3,
+    /// That it took to find out.
+    pub(super) rays: u32,
+}
+
 impl PathTracer {
-    /// Share of light that comes along a shadow ray from a `distance` (scene units, may be infinite) through at most so many clear
-    /// sheets, and how many rays it took to find out: 0 where anything else is in the way.
-    pub(super) fn through_sheets(&self, shadow_ray: &Ray, distance: f32, most_sheets: u32) -> (Vec3, u32) {
-        let end = distance.is_finite().then(|| shadow_ray.origin + distance * shadow_ray.direction);
-        let (mut ray, mut left, mut share) = (*shadow_ray, distance, Vec3::ONE);
+    /// What comes along a shadow ray from the light through at most so many clear sheets.
+    pub(super) fn through_sheets(&self, shadow_ray: &ShadowRay, most_sheets: u32) -> Passed {
+        let ShadowRay { mut ray, distance } = *shadow_ray;
+        let end = distance.is_finite().then(|| ray.origin + distance * ray.direction);
+        let (mut left, mut share) = (distance, Vec3::ONE);
         for rays in 1..=most_sheets + 1 {
-            let Some(hit) = self.world.closest(&ray).filter(|hit| hit.distance < left) else { return (share, rays) };
+            let Some(hit) = self.world.closest(&ray).filter(|hit| hit.distance < left) else {
+                return Passed { share, rays };
+            };
             let wo = -Vec3::from(ray.direction);
             let point = self.world.surface(&ray, &hit);
             let components = Components::new();
@@ -58,7 +70,7 @@ impl PathTracer {
             let shading = self.shading(&bsdf, &point, &frames);
             share *= shading.straight_through(wo);
             if share == Vec3::ZERO {
-                return (share, rays);
+                return Passed { share, rays };
             }
             ray.origin = point.spawn(-wo);
             // Lifting the origin off the sheet moves the ray aside, and the lamp itself would be in its way: it is aimed anew.
@@ -67,6 +79,6 @@ impl PathTracer {
                 ray = Ray { time: ray.time, ..Ray::new(ray.origin, (end - ray.origin) / left) };
             }
         }
-        (Vec3::ZERO, most_sheets + 1)
+        Passed { share: Vec3::ZERO, rays: most_sheets + 1 }
     }
 }

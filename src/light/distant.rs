@@ -1,7 +1,7 @@
 //! Directional lights and the sun: light from one direction, or from a disc around it.
 
 use super::LightSample;
-use super::distribution::Distribution1d;
+use super::distribution::{ChosenCell, Distribution1d};
 use super::sphere::Cone;
 use crate::scene::Light;
 use glam::Vec3;
@@ -58,7 +58,7 @@ impl DistantLights {
     }
 
     pub(super) fn sample(&self, u: [f32; 3]) -> LightSample {
-        let (index, chosen) = self.choice.sample_discrete(u[2]);
+        let ChosenCell { index, probability } = self.choice.choose(u[2]);
         let DistantLight { cone, strength, has_disc } = &self.lights[index];
         let (direction, radiance) = if *has_disc {
             let direction = cone.sample([u[0], u[1]]);
@@ -67,7 +67,7 @@ impl DistantLights {
         } else {
             (cone.axis, *strength)
         };
-        let pdf = if *has_disc { self.pdf(direction) } else { chosen };
+        let pdf = if *has_disc { self.pdf(direction) } else { probability };
         LightSample { direction, place: None, radiance, pdf, is_delta: !has_disc }
     }
 

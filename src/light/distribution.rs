@@ -7,6 +7,22 @@ pub(super) struct Distribution1d {
     cumulative: Vec<f32>,
 }
 
+/// One cell of a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ChosenCell {
+    pub(super) index: usize,
+    pub(super) probability: f32,
+}
+
+/// A place along a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlaceSample {
+    /// In [0, 1).
+    pub(super) place: f32,
+    /// Relative to uniform.
+    pub(super) density: f32,
+}
+
 impl Distribution1d {
     /// `None` unless some weight is above 0 and all are finite.
     pub(super) fn new(weights: &[f64]) -> Option<Self> {
@@ -25,19 +41,20 @@ impl Distribution1d {
         Some(Self { cumulative })
     }
 
-    /// A cell and its probability.
-    pub(super) fn sample_discrete(&self, u: f32) -> (usize, f32) {
+    /// A cell.
+    pub(super) fn choose(&self, u: f32) -> ChosenCell {
         let index = self.cell_of(u);
-        (index, self.probability(index))
+        ChosenCell { index, probability: self.probability(index) }
     }
 
-    /// A position in [0, 1) along the row, and its density relative to uniform.
-    pub(super) fn sample_continuous(&self, u: f32) -> (f32, f32) {
+    /// A place along the row.
+    pub(super) fn sample(&self, u: f32) -> PlaceSample {
         let index = self.cell_of(u);
         let cells = (self.cumulative.len() - 1) as f32;
         let probability = self.probability(index);
         let within = ((u - self.cumulative[index]) / probability).clamp(0.0, 1.0);
-        (((index as f32 + within) / cells).min(1.0 - f32::EPSILON / 2.0), probability * cells)
+        let place = ((index as f32 + within) / cells).min(1.0 - f32::EPSILON / 2.0);
+        PlaceSample { place, density: probability * cells }
     }
 
     /// Probability of a cell.
@@ -67,12 +84,12 @@ mod tests {
         let n = 4000;
         let mut counts = [0; 4];
         for i in 0..n {
-            counts[d.sample_discrete((i as f32 + 0.5) / n as f32).0] += 1;
+            counts[d.choose((i as f32 + 0.5) / n as f32).index] += 1;
         }
         assert_eq!(counts, [1000, 0, 3000, 0]);
-        let (x, density) = d.sample_continuous(0.625);
-        assert!((x - 0.625).abs() < 1e-6 && (density - 3.0).abs() < 1e-6, "{x} {density}");
-        assert_eq!(d.sample_discrete(1.0).0, 2, "u at its end stays in a cell that has weight");
+        let PlaceSample { place, density } = d.sample(0.625);
+        assert!((place - 0.625).abs() < 1e-6 && (density - 3.0).abs() < 1e-6, "{place} {density}");
+        assert_eq!(d.choose(1.0).index, 2, "u at its end stays in a cell that has weight");
     }
 
     #[test]

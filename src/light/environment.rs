@@ -5,7 +5,7 @@
 //! constant environment is not sampled at all.
 
 use super::LightSample;
-use super::distribution::Distribution1d;
+use super::distribution::{ChosenCell, Distribution1d, PlaceSample};
 use crate::scene::Environment;
 use glam::Vec3;
 
@@ -21,6 +21,12 @@ pub(super) struct EnvironmentSampler {
 struct Cells {
     rows: Distribution1d,
     columns: Vec<Option<Distribution1d>>,
+}
+
+struct DirectionSample {
+    direction: Vec3,
+    /// Per steradian.
+    pdf: f32,
 }
 
 impl EnvironmentSampler {
@@ -41,7 +47,7 @@ impl EnvironmentSampler {
     }
 
     pub(super) fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
-        let (direction, pdf) = self.cells.as_ref()?.sample(&self.environment, u)?;
+        let DirectionSample { direction, pdf } = self.cells.as_ref()?.sample(&self.environment, u)?;
         (pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
             direction,
             place: None,
@@ -87,15 +93,14 @@ impl Cells {
         })
     }
 
-    /// A direction and its probability per steradian.
-    fn sample(&self, environment: &Environment, u: [f32; 2]) -> Option<(Vec3, f32)> {
-        let (row, probability) = self.rows.sample_discrete(u[1]);
+    fn sample(&self, environment: &Environment, u: [f32; 2]) -> Option<DirectionSample> {
+        let ChosenCell { index: row, probability } = self.rows.choose(u[1]);
         let within = ((u[1] - self.rows.cumulative_before(row)) / probability).clamp(0.0, 1.0);
-        let (along, density) = self.columns[row].as_ref()?.sample_continuous(u[0]);
+        let PlaceSample { place: along, density } = self.columns[row].as_ref()?.sample(u[0]);
         let row = row as u32;
         let local = environment.parametrisation.direction_in_row(row, environment.height, along, within);
         let pdf = probability * density / row_solid_angle(environment, row) as f32;
-        Some((environment.from_world.transpose() * local, pdf))
+        Some(DirectionSample { direction: environment.from_world.transpose() * local, pdf })
     }
 
     /// Probability per steradian of a direction.

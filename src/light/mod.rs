@@ -36,7 +36,7 @@ use environment::EnvironmentSampler;
 use flat::FlatEmitter;
 use glam::Vec3;
 use sphere::SphereEmitter;
-use tree::LightTree;
+use tree::{ChosenEmitter, LightTree};
 
 /// A direction towards a light, seen from a point.
 #[derive(Clone, Copy, Debug)]
@@ -221,8 +221,8 @@ impl Lights {
             Kind::Environment => self.environment.as_ref()?.sample([u0, u1]),
             Kind::Distant => Some(self.distant.as_ref()?.sample([u0, u1, select])),
             Kind::Placed => {
-                let (index, chosen) = self.tree.as_ref()?.sample(receiver, select)?;
-                chosen_by(self.sample_emitter(world, index, receiver, time, [u0, u1]), chosen)
+                let ChosenEmitter { index, probability } = self.tree.as_ref()?.sample(receiver, select)?;
+                chosen_by(self.sample_emitter(world, index, receiver, time, [u0, u1]), probability)
             }
         }
     }

@@ -3,7 +3,7 @@
 use super::emission::{emitted, even_radiance};
 use super::{LightPlace, LightSample};
 use crate::geometry::{World, offset};
-use crate::scene::{Alpha, Material, SpherePlace};
+use crate::scene::{Alpha, SpherePlace};
 use glam::{Mat3A, Vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -23,7 +23,7 @@ impl SphereEmitter {
     /// A sphere as it is at a share of the open shutter.
     pub(super) fn new(world: &World, object: u32, time: f32) -> Self {
         let SpherePlace { center, radius, axes } = world.sphere_at(object, time);
-        let material = material_of(world, object);
+        let material = world.material(object);
         Self {
             object,
             center: center.into(),
@@ -39,7 +39,7 @@ impl SphereEmitter {
         self.even_radiance.unwrap_or_else(|| {
             let place = SpherePlace { center: self.center.into(), radius: self.radius, axes: self.axes };
             let (textures, uv) = (&world.scene().textures, place.uv(normal.into()));
-            let material = material_of(world, self.object);
+            let material = world.material(self.object);
             emitted(material, textures, uv, direction.dot(normal).abs()) * material.alpha.coverage(textures, uv)
         })
     }
@@ -85,10 +85,6 @@ impl SphereEmitter {
         let one_minus_cos = self.one_minus_cos(from).filter(|_| !is_far_side);
         one_minus_cos.map_or(0.0, |one_minus_cos| Cone { axis: Vec3::Y, one_minus_cos }.pdf())
     }
-}
-
-fn material_of(world: &World, object: u32) -> &Material {
-    &world.scene().materials[world.material_of(object).0 as usize]
 }
 
 /// Directions around an axis.

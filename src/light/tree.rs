@@ -37,8 +37,8 @@ impl LightBounds {
         0.5 * (self.min + self.max)
     }
 
-    fn normals(&self) -> Cone {
-        Cone { axis: self.axis, half_angle: self.normal_angle }
+    fn normals(&self) -> NormalCone {
+        NormalCone { axis: self.axis, half_angle: self.normal_angle }
     }
 
     fn union(&self, other: &Self) -> Self {
@@ -65,15 +65,15 @@ fn angle(a: Vec3, b: Vec3) -> f32 {
     a.dot(b).clamp(-1.0, 1.0).acos()
 }
 
-/// Directions around a unit axis.
+/// Normals around a unit axis.
 #[derive(Clone, Copy)]
-struct Cone {
+struct NormalCone {
     axis: Vec3,
     /// In [0, π].
     half_angle: f32,
 }
 
-impl Cone {
+impl NormalCone {
     /// The smallest cone around both.
     fn union(self, other: Self) -> Self {
         let (wide, narrow) = if self.half_angle >= other.half_angle { (self, other) } else { (other, self) };
@@ -102,7 +102,20 @@ fn orientation_measure(normal_angle: f32, emission_angle: f32) -> f32 {
 /// A node as built, with two children or an emitter.
 enum Binary {
     Leaf { emitter: u32 },
-    Inner { children: Box<[(LightBounds, Binary); 2]> },
+    Inner { children: Box<[Bounded; 2]> },
+}
+
+/// What lies below a node can give so much.
+struct Bounded {
+    bounds: LightBounds,
+    node: Binary,
+}
+
+/// An emitter.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ChosenEmitter {
+    pub(super) index: usize,
+    pub(super) probability: f32,
 }
 
 /// A node as walked.
@@ -150,7 +163,7 @@ impl LightTree {
         if emitters.is_empty() {
             return None;
         }
-        let (_, root) = build(bounds, &mut emitters, 0);
+        let root = build(bounds, &mut emitters, 0).node;
         let mut tree = Self {
             nodes: Vec::with_capacity(2 * emitters.len()),
             givers: Vec::new(),
@@ -174,7 +187,7 @@ impl LightTree {
         let mut group = Vec::from(*children);
         while group.len() < WIDTH {
             // Opens the child that is worst described by its bounds: intense and wide.
-            let badness = |(bounds, node): &(LightBounds, Binary)| match node {
+            let badness = |Bounded { bounds, node }: &Bounded| match node {
                 Binary::Leaf { .. } => 0.0,
                 Binary::Inner { .. } => bounds.intensity * (bounds.max - bounds.min).length_squared().max(1e-30),
             };
@@ -182,7 +195,7 @@ impl LightTree {
             if badness(&group[worst]) == 0.0 {
                 break;
             }
-            if let (_, Binary::Inner { children }) = group.remove(worst) {
+            if let Binary::Inner { children } = group.remove(worst).node {
                 group.extend(*children);
             }
         }
@@ -190,10 +203,10 @@ impl LightTree {
         let node = &mut self.nodes[place as usize];
         (node.first, node.children, node.givers) = (first, group.len() as u32, self.givers.len() as u32);
         self.nodes.extend(group.iter().map(|_| Node::childless(place)));
-        let bounds: Vec<LightBounds> = group.iter().map(|(bounds, _)| *bounds).collect();
+        let bounds: Vec<LightBounds> = group.iter().map(|child| child.bounds).collect();
         self.givers.extend(bounds.chunks(Givers::LANES).map(Givers::new));
-        for (offset, (_, child)) in group.into_iter().enumerate() {
-            self.place(first + offset as u32, child);
+        for (offset, child) in group.into_iter().enumerate() {
+            self.place(first + offset as u32, child.node);
         }
     }
 
@@ -209,9 +222,9 @@ impl LightTree {
         (importances, total)
     }
 
-    /// An emitter and the probability of its choice; `None` where none of several can give anything. An only emitter is
+    /// An emitter by chance; `None` where none of several can give anything. An only emitter is
     /// always chosen: whether it can give is then for its own sampling to say.
-    pub(super) fn sample(&self, receiver: &LightReceiver, mut u: f32) -> Option<(usize, f32)> {
+    pub(super) fn sample(&self, receiver: &LightReceiver, mut u: f32) -> Option<ChosenEmitter> {
         let (mut node, mut probability) = (&self.nodes[0], 1.0);
         while node.children > 0 {
             let (importances, total) = self.importances(receiver, node);
@@ -236,7 +249,7 @@ impl LightTree {
             probability *= importance / total;
             node = &self.nodes[node.first as usize + index];
         }
-        Some((node.first as usize, probability))
+        Some(ChosenEmitter { index: node.first as usize, probability })
     }
 
     /// Probability that [`LightTree::sample`] chooses an emitter.
@@ -256,14 +269,15 @@ impl LightTree {
     }
 }
 
-fn build(bounds: &[LightBounds], emitters: &mut [u32], depth: u32) -> (LightBounds, Binary) {
+fn build(bounds: &[LightBounds], emitters: &mut [u32], depth: u32) -> Bounded {
     if let [emitter] = *emitters {
-        return (bounds[emitter as usize], Binary::Leaf { emitter });
+        return Bounded { bounds: bounds[emitter as usize], node: Binary::Leaf { emitter } };
     }
     let middle = if depth < HALVE_BELOW { split(bounds, emitters) } else { emitters.len() / 2 };
     let (first, second) = emitters.split_at_mut(middle);
     let children = [build(bounds, first, depth + 1), build(bounds, second, depth + 1)];
-    (children[0].0.union(&children[1].0), Binary::Inner { children: Box::new(children) })
+    let both = children[0].bounds.union(&children[1].bounds);
+    Bounded { bounds: both, node: Binary::Inner { children: Box::new(children) } }
 }
 
 /// Orders emitters so that the first part and the rest make the cheapest pair of nodes; the size of the first part.

@@ -38,44 +38,11 @@ pub fn write_exr(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> 
         })
         .collect();
 
-    let size = Vec2(picture.width as usize, picture.height as usize);
-    let mut layer_attributes = LayerAttributes { software_name: Some("fechner".into()), ..LayerAttributes::default() };
-    let mut pixel_aspect = 1.0;
-    for (name, value) in &picture.attributes {
-        if let (PIXEL_ASPECT_RATIO, &Attribute::Float(ratio)) = (name.as_str(), value) {
-            pixel_aspect = ratio;
-            continue;
-        }
-        if let (FRAMES_PER_SECOND, &Attribute::Float(rate)) = (name.as_str(), value) {
-            layer_attributes.frames_per_second = frame_rate::rational(rate);
-            continue;
-        }
-        if let (NITS_PER_UNIT, &Attribute::Float(nits)) = (name.as_str(), value) {
-            layer_attributes.white_luminance = Some(nits);
-        }
-        layer_attributes.other.insert(text(name), attribute_value(value));
-    }
-    if replaced > 0 {
-        let count = i32::try_from(replaced).unwrap_or(i32::MAX);
-        layer_attributes.other.insert(text(REPLACED_VALUES), AttributeValue::I32(count));
-    }
-    let mut shown = IntegerBounds::from_dimensions(size);
-    if let Some(PartOf { origin: [x, y], whole }) = picture.part_of {
-        let place = format!("{x},{y},{},{}", picture.width, picture.height);
-        layer_attributes.other.insert(text(CROP), AttributeValue::Text(text(&place)));
-        layer_attributes.layer_position = Vec2(x as i32, y as i32);
-        shown = IntegerBounds::from_dimensions(Vec2(whole[0] as usize, whole[1] as usize));
-    }
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
-    let mut image_attributes = ImageAttributes::new(shown);
-    image_attributes.pixel_aspect = pixel_aspect;
-    let Primaries { red, green, blue, white } = Primaries::REC709;
-    let [red, green, blue, white] = [red, green, blue, white].map(|[x, y]| Vec2(x as f32, y as f32));
-    image_attributes.chromaticities = Some(Chromaticities { red, green, blue, white });
-    let image = Image::empty(image_attributes).with_layer(Layer::new(
-        size,
-        layer_attributes,
+    let image = Image::empty(image_attributes(picture)).with_layer(Layer::new(
+        Vec2(picture.width as usize, picture.height as usize),
+        layer_attributes(picture, replaced),
         encoding,
         AnyChannels::sort(channels),
     ));
@@ -87,6 +54,48 @@ pub fn write_exr(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> 
         drop(buffered);
         sort_attributes(file)
     })
+}
+
+/// What a picture says of itself, but for its shape; `replaced`: of its values.
+fn layer_attributes(picture: &Picture<'_>, replaced: usize) -> LayerAttributes {
+    let mut attributes = LayerAttributes { software_name: Some("fechner".into()), ..LayerAttributes::default() };
+    for (name, value) in &picture.attributes {
+        match (name.as_str(), value) {
+            (PIXEL_ASPECT_RATIO, Attribute::Float(_)) => continue,
+            (FRAMES_PER_SECOND, &Attribute::Float(rate)) => {
+                attributes.frames_per_second = frame_rate::rational(rate);
+                continue;
+            }
+            (NITS_PER_UNIT, &Attribute::Float(nits)) => attributes.white_luminance = Some(nits),
+            _ => {}
+        }
+        attributes.other.insert(text(name), attribute_value(value));
+    }
+    if replaced > 0 {
+        let count = i32::try_from(replaced).unwrap_or(i32::MAX);
+        attributes.other.insert(text(REPLACED_VALUES), AttributeValue::I32(count));
+    }
+    if let Some(PartOf { origin: [x, y], .. }) = picture.part_of {
+        let place = format!("{x},{y},{},{}", picture.width, picture.height);
+        attributes.other.insert(text(CROP), AttributeValue::Text(text(&place)));
+        attributes.layer_position = Vec2(x as i32, y as i32);
+    }
+    attributes
+}
+
+/// The whole that is shown, of which the picture may be a part, the shape of its pixels and its primaries.
+fn image_attributes(picture: &Picture<'_>) -> ImageAttributes {
+    let [width, height] = picture.part_of.map_or([picture.width, picture.height], |part| part.whole);
+    let mut attributes = ImageAttributes::new(IntegerBounds::from_dimensions(Vec2(width as usize, height as usize)));
+    for (name, value) in &picture.attributes {
+        if let (PIXEL_ASPECT_RATIO, &Attribute::Float(ratio)) = (name.as_str(), value) {
+            attributes.pixel_aspect = ratio;
+        }
+    }
+    let Primaries { red, green, blue, white } = Primaries::REC709;
+    let [red, green, blue, white] = [red, green, blue, white].map(|[x, y]| Vec2(x as f32, y as f32));
+    attributes.chromaticities = Some(Chromaticities { red, green, blue, white });
+    attributes
 }
 
 fn io_error(error: ::exr::error::Error) -> std::io::Error {

@@ -9,6 +9,7 @@ use super::screen::{Looked, Scenery, Screen};
 use super::server::{Door, serve};
 use super::session::{Pace, blank_status, count, in_words, publish};
 use super::shared::Shared;
+use super::spectator::Stage;
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
@@ -87,10 +88,10 @@ impl<'a> Audience<'a> {
     }
 
     fn show(&self, moving: &mut Moving, state: &RenderState) {
-        let is_at_rest = moving.status.phase == Phase::Stopped;
+        let stage = if moving.status.phase == Phase::Stopped { Stage::AtRest } else { Stage::UnderWay };
         // The film stands in for itself where it has no samples yet.
         let (film, tone, settings) = (&state.film, state.tone.as_ref(), self.settings);
-        moving.screen.show(Scenery { film, tone, settings, is_at_rest, step: 1 }, &self.shared);
+        moving.screen.show(Scenery { film, tone, settings, stage, step: 1 }, &self.shared);
         (moving.status.width, moving.status.height) = (film.width(), film.height());
         let total_samples = moving.screen.total_samples;
         count(&mut moving.status, state, total_samples, moving.progress.as_ref());

@@ -2,6 +2,7 @@
 
 use super::layer::Layer;
 use super::shared::{Encoded, Shared};
+use super::spectator::Stage;
 use crate::output::false_colour::Colours;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -19,8 +20,8 @@ pub(super) struct Frame {
     pub(super) colours: Colours,
     pub(super) width: u32,
     pub(super) height: u32,
-    /// Whether nothing changes now: then it is exact.
-    pub(super) is_at_rest: bool,
+    /// At rest it is exact.
+    pub(super) stage: Stage,
 }
 
 /// What frames on their way cost the render.
@@ -46,7 +47,7 @@ impl Encoding {
     pub(super) fn publish(self: &Arc<Self>, frames: Vec<Frame>, shared: &Arc<Shared>) {
         let number = shared.number_a_frame();
         let threads = rayon::current_num_threads() as u64;
-        if threads == 1 || frames.iter().all(|frame| frame.is_at_rest) {
+        if threads == 1 || frames.iter().all(|frame| frame.stage == Stage::AtRest) {
             self.cost_ns.store(0, Ordering::SeqCst);
             frames.iter().for_each(|frame| frame.publish(number, shared));
             return;
@@ -75,11 +76,11 @@ impl Frame {
     /// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at rest; `None` if it
     /// cannot be encoded.
     fn encode(&self) -> Option<Vec<u8>> {
-        let Self { layer, ref colours, width, height, is_at_rest } = *self;
+        let Self { layer, ref colours, width, height, stage } = *self;
         let legend = &colours.legend.as_bytes()[..colours.legend.floor_char_boundary(255)];
         let mut frame = vec![layer.index() as u8, legend.len() as u8];
         frame.extend_from_slice(legend);
-        if is_at_rest {
+        if stage == Stage::AtRest {
             let encoder = PngEncoder::new_with_quality(&mut frame, CompressionType::Fast, FilterType::Adaptive);
             encoder.write_image(&colours.rgb8, width, height, ExtendedColorType::Rgb8).ok()?;
         } else {
@@ -103,9 +104,9 @@ mod tests {
     fn frames_show_the_picture() {
         let pixel = |i: u32| if (i % 40 + i / 40).is_multiple_of(2) { [200, 40, 40] } else { [40, 40, 200] };
         let rgb8: Vec<u8> = (0..40 * 24).flat_map(pixel).collect();
-        for (is_at_rest, tolerance) in [(true, 0.0), (false, 8.0)] {
+        for (stage, tolerance) in [(Stage::AtRest, 0.0), (Stage::UnderWay, 8.0)] {
             let colours = Colours { rgb8: rgb8.clone(), legend: "legend".to_owned() };
-            let frame = Frame { layer: Layer::Albedo, colours, width: 40, height: 24, is_at_rest };
+            let frame = Frame { layer: Layer::Albedo, colours, width: 40, height: 24, stage };
             let frame = frame.encode().expect("a frame");
             assert_eq!((frame[0], &frame[1..8]), (Layer::Albedo.index() as u8, &b"\x06legend"[..]));
             let shown = image::load_from_memory(&frame[8..]).expect("a picture").to_rgb8();
@@ -113,7 +114,7 @@ mod tests {
             let square = |(a, b): (&u8, &u8)| (f64::from(*a) - f64::from(*b)).powi(2);
             let sum: f64 = shown.as_raw().iter().zip(&rgb8).map(square).sum();
             let rms = (sum / rgb8.len() as f64).sqrt();
-            assert!(rms <= tolerance, "{rms} of 255 off, at rest: {is_at_rest}");
+            assert!(rms <= tolerance, "{rms} of 255 off, {stage:?}");
         }
     }
 
@@ -121,10 +122,9 @@ mod tests {
     #[test]
     fn a_picture_too_wide_for_a_frame_has_none() {
         let colours = || Colours { rgb8: vec![0; 3 * 65_536], legend: String::new() };
-        let frame =
-            |is_at_rest| Frame { layer: Layer::Picture, colours: colours(), width: 65_536, height: 1, is_at_rest };
-        assert!(frame(false).encode().is_none());
-        assert!(frame(true).encode().is_some());
+        let frame = |stage| Frame { layer: Layer::Picture, colours: colours(), width: 65_536, height: 1, stage };
+        assert!(frame(Stage::UnderWay).encode().is_none());
+        assert!(frame(Stage::AtRest).encode().is_some());
     }
 
     /// Also from threads of a pool, and none is shown after one that was made later.
@@ -134,17 +134,17 @@ mod tests {
         let encoding = Arc::new(Encoding::default());
         let seat = Seat::take(&shared, Layer::Picture);
         let frames = seat.frames();
-        let frame = |grey: u8, is_at_rest| Frame {
+        let frame = |grey: u8, stage| Frame {
             layer: Layer::Picture,
             colours: Colours { rgb8: vec![grey; 3 * 64], legend: String::new() },
             width: 8,
             height: 8,
-            is_at_rest,
+            stage,
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
         pool.install(|| {
-            (0..50).for_each(|grey| encoding.publish(vec![frame(grey, false)], &shared));
-            encoding.publish(vec![frame(200, true)], &shared);
+            (0..50).for_each(|grey| encoding.publish(vec![frame(grey, Stage::UnderWay)], &shared));
+            encoding.publish(vec![frame(200, Stage::AtRest)], &shared);
         });
         while encoding.is_under_way() {
             std::thread::yield_now();

@@ -32,7 +32,7 @@ mod viewer;
 pub use audience::Audience;
 pub use screen::Looked;
 pub use server::{Door, random_token};
-pub use spectator::{Shown, Spectator};
+pub use spectator::{Shown, Spectator, Stage};
 pub use tev::{TEV_PORT, Tev};
 
 use crate::adaptive::Rendered;

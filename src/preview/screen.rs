@@ -4,7 +4,7 @@ use super::coarse::stand_in;
 use super::frame::{Encoding, Frame};
 use super::layer::{self, Layer};
 use super::shared::Shared;
-use super::spectator::{Shown, Spectator};
+use super::spectator::{Shown, Spectator, Stage};
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
@@ -69,8 +69,8 @@ pub(super) struct Scenery<'a> {
     /// The operator's fit at the last look.
     pub(super) tone: Option<&'a SavedTone>,
     pub(super) settings: &'a LoopSettings,
-    /// Whether nothing changes now: then frames are exact.
-    pub(super) is_at_rest: bool,
+    /// At rest frames are exact.
+    pub(super) stage: Stage,
     /// Pixels of the picture to each of the film's, each way.
     pub(super) step: u32,
 }
@@ -187,13 +187,13 @@ impl Screen {
         // Denoised pictures are made by looks; between two the last one stays.
         let looked = self.looked.as_ref().or(self.looked_before.as_ref());
         let denoised = looked.and_then(|looked| looked.denoised.clone());
-        let (raw, samples) = composed(scenery.film, nits_per_unit, scenery.is_at_rest);
+        let (raw, samples) = composed(scenery.film, nits_per_unit, scenery.stage);
         let rgb_cd_m2 = denoised.unwrap_or(raw);
         self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
-        let (width, height, is_at_rest) = (scenery.film.width(), scenery.film.height(), scenery.is_at_rest);
+        let (width, height, stage) = (scenery.film.width(), scenery.film.height(), scenery.stage);
         let watched = ALL.into_iter().filter(|&layer| shared.is_watched(layer));
         let frames = watched
-            .map(|layer| Frame { layer, colours: self.colours(layer, scenery, &rgb_cd_m2), width, height, is_at_rest })
+            .map(|layer| Frame { layer, colours: self.colours(layer, scenery, &rgb_cd_m2), width, height, stage })
             .collect();
         self.encoding.publish(frames, shared);
         let shown = Shown {
@@ -202,7 +202,7 @@ impl Screen {
             step: scenery.step,
             looked: self.looked.as_deref(),
             nits_per_unit,
-            is_at_rest: scenery.is_at_rest,
+            stage,
         };
         self.spectators.iter_mut().for_each(|spectator| spectator.shown(&shown));
         shared.publish_snapshot(Snapshot {
@@ -227,10 +227,11 @@ impl Screen {
     }
 
     fn provisional_tone(&mut self, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> &dyn FittedTone {
-        let Scenery { film, settings, is_at_rest, step, .. } = scenery;
+        let Scenery { film, settings, stage, step, .. } = scenery;
         let (pixels, samples) = (film.pixel_count(), self.total_samples);
         // What rests is shown by a fit of its own.
-        self.provisional = self.provisional.take().filter(|tone| !is_at_rest && tone.holds(pixels, samples));
+        let holds = |tone: &ProvisionalTone| stage == Stage::UnderWay && tone.holds(pixels, samples);
+        self.provisional = self.provisional.take().filter(holds);
         let tone = self.provisional.get_or_insert_with(|| ProvisionalTone {
             fitted: fit(settings, step, film.width() as usize, rgb_cd_m2),
             pixels,
@@ -301,12 +302,15 @@ const ALL: [Layer; layer::LAYERS] = [
 
 /// The film's picture, cd/m², and its samples of each pixel; where it has none, another pixel's picture. In one walk: a film is
 /// many times as large as a picture.
-fn composed(film: &Film, nits_per_unit: f64, is_at_rest: bool) -> (Vec<[f32; 3]>, Vec<u32>) {
+fn composed(film: &Film, nits_per_unit: f64, stage: Stage) -> (Vec<[f32; 3]>, Vec<u32>) {
     // While a pixel's pilot is traced one half is ahead of the other, and their samples count alike.
     let is_in_pilot =
         |pixel: usize| Half::BOTH.iter().all(|&half| film.half(half)[pixel].taken <= PILOT_SAMPLES_A_HALF);
     let light = |pixel: usize| {
-        let light = if !is_at_rest && is_in_pilot(pixel) { Film::mean_of_samples_cd_m2 } else { Film::rgb_cd_m2 };
+        let light = match stage {
+            Stage::UnderWay if is_in_pilot(pixel) => Film::mean_of_samples_cd_m2,
+            _ => Film::rgb_cd_m2,
+        };
         light(film, pixel, nits_per_unit)
     };
     let of_pixel = |pixel: usize| match film.samples(pixel) {
@@ -334,17 +338,13 @@ mod tests {
     use super::super::shared::Seat;
     use super::*;
     use crate::film::BlockSum;
-    use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use crate::integrator::{BlockWork, PathSample};
     use glam::Vec3;
 
     /// Adds a block of samples of one grey.
     fn add(film: &mut Film, work: BlockWork, grey: f32) {
         let mut sum = BlockSum::default();
-        let sample = PathSample {
-            radiance: Vec3::splat(grey),
-            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false },
-            rays: 1,
-        };
+        let sample = PathSample::of_wall(Vec3::splat(grey));
         (0..work.samples).for_each(|_| sum.add(&sample));
         film.merge_block(work, &sum);
     }
@@ -395,18 +395,18 @@ mod tests {
         let (before, after) = (settings_with("constant"), settings_with("reinhard02"));
         let mut screen = Screen::new(Vec::new());
         screen.total_samples = film.total_samples();
-        let legend = |screen: &mut Screen, settings: &LoopSettings, is_at_rest: bool| {
-            let scenery = Scenery { film: &film, tone: None, settings, is_at_rest, step: 1 };
+        let legend = |screen: &mut Screen, settings: &LoopSettings, stage: Stage| {
+            let scenery = Scenery { film: &film, tone: None, settings, stage, step: 1 };
             screen.picture(scenery, &[[100.0; 3]; 2]).legend
         };
-        let first = legend(&mut screen, &before, false);
-        assert_eq!(legend(&mut screen, &after, false), first, "the fit is kept");
-        let at_rest = legend(&mut screen, &after, true);
+        let first = legend(&mut screen, &before, Stage::UnderWay);
+        assert_eq!(legend(&mut screen, &after, Stage::UnderWay), first, "the fit is kept");
+        let at_rest = legend(&mut screen, &after, Stage::AtRest);
         assert_ne!(at_rest, first);
         screen.forget_look();
-        assert_eq!(legend(&mut screen, &before, false), first);
+        assert_eq!(legend(&mut screen, &before, Stage::UnderWay), first);
         screen.forget_look();
-        assert_eq!(legend(&mut screen, &after, false), at_rest);
+        assert_eq!(legend(&mut screen, &after, Stage::UnderWay), at_rest);
     }
 
     /// Other eyes are shown the denoised picture too before they have looked, and another place is not.
@@ -421,7 +421,7 @@ mod tests {
         let mut screen = Screen::new(Vec::new());
         screen.looked = Some(Arc::new(looked));
         let shown = |screen: &mut Screen| {
-            let scenery = Scenery { film: &film, tone: None, settings: &settings, is_at_rest: true, step: 1 };
+            let scenery = Scenery { film: &film, tone: None, settings: &settings, stage: Stage::AtRest, step: 1 };
             screen.publish(scenery, &shared);
             let snapshot = shared.snapshot().expect("something shown");
             (snapshot.rgb_cd_m2[0], snapshot.looked.is_some())
@@ -444,8 +444,8 @@ mod tests {
         add(&mut film, BlockWork { samples: 2, ..BlockWork::whole(0, Half::B, 0) }, 2.0);
         add(&mut film, BlockWork::whole(1, Half::B, 0), 2.0);
         add(&mut film, BlockWork::whole(1, Half::A, 1), 1.0);
-        let greys = |is_at_rest| composed(&film, 1.0, is_at_rest).0.iter().map(|rgb| rgb[0]).collect::<Vec<f32>>();
-        assert_eq!(greys(false), [1.2, 1.5]);
-        assert_eq!(greys(true), [1.5, 1.5]);
+        let greys = |stage| composed(&film, 1.0, stage).0.iter().map(|rgb| rgb[0]).collect::<Vec<f32>>();
+        assert_eq!(greys(Stage::UnderWay), [1.2, 1.5]);
+        assert_eq!(greys(Stage::AtRest), [1.5, 1.5]);
     }
 }

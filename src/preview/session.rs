@@ -19,6 +19,7 @@ use super::glimpse::{Glimpse, Resolution};
 use super::orbit::Held;
 use super::screen::{Scenery, Screen};
 use super::shared::Shared;
+use super::spectator::Stage;
 use super::{Host, Job, Options};
 use crate::adaptive::glimpse::steady_glimpse_from;
 use crate::adaptive::judge::JudgeError;
@@ -271,7 +272,7 @@ impl<'a> Session<'a> {
     fn show(&mut self) {
         if let Some(Glimpse { film, step }) = &self.glimpse {
             let settings = &self.settings;
-            let scenery = Scenery { film, tone: None, settings, is_at_rest: false, step: *step };
+            let scenery = Scenery { film, tone: None, settings, stage: Stage::UnderWay, step: *step };
             return self.screen.publish(scenery, self.shared);
         }
         self.find_motion();
@@ -279,7 +280,7 @@ impl<'a> Session<'a> {
             film: &self.state.film,
             tone: self.state.tone.as_ref(),
             settings: &self.settings,
-            is_at_rest: matches!(self.phase, Phase::Paused | Phase::Stopped),
+            stage: if matches!(self.phase, Phase::Paused | Phase::Stopped) { Stage::AtRest } else { Stage::UnderWay },
             step: 1,
         };
         self.screen.show(scenery, self.shared);

@@ -22,6 +22,15 @@ pub struct Shown<'a> {
     pub looked: Option<&'a Looked>,
     /// Luminance in cd/m² of RGB (1, 1, 1).
     pub nits_per_unit: f64,
-    /// Whether nothing changes now.
-    pub is_at_rest: bool,
+    /// Whether it will change.
+    pub stage: Stage,
+}
+
+/// Whether a picture will change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Samples go into it.
+    UnderWay,
+    /// Not unless somebody asks for it.
+    AtRest,
 }

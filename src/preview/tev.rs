@@ -7,7 +7,7 @@ mod packet;
 #[cfg(test)]
 mod tests;
 
-use super::spectator::{Shown, Spectator};
+use super::spectator::{Shown, Spectator, Stage};
 use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
 use crate::output::channel;
@@ -96,7 +96,10 @@ impl Tev {
 
     /// Hands a state over if one is due.
     pub fn offer(&mut self, shown: &Shown<'_>) {
-        let is_wanted = if shown.is_at_rest { !self.has_ended() } else { self.is_due() };
+        let is_wanted = match shown.stage {
+            Stage::AtRest => !self.has_ended(),
+            Stage::UnderWay => self.is_due(),
+        };
         // What is shown while the camera moves is too coarse to be looked into.
         if !is_wanted || shown.step != 1 {
             return;

@@ -42,44 +42,53 @@ async fn next_frame(look: &mut Option<Look>) -> Bytes {
     std::future::pending().await
 }
 
+/// What one viewer looks at and points to.
+struct Viewer {
+    shared: Arc<Shared>,
+    look: Option<Look>,
+    beside: Option<Look>,
+    pointer: Pointer,
+}
+
+impl Viewer {
+    fn of(shared: Arc<Shared>) -> Self {
+        let look = Some(Look::at(&shared, Layer::Picture));
+        Self { look, beside: None, pointer: Pointer::of(&shared), shared }
+    }
+
+    /// Does what it says; what it is answered.
+    fn heed(&mut self, text: &str) -> Option<String> {
+        match serde_json::from_str(text) {
+            Ok(Command::Layer { layer }) => self.look = Some(Look::at(&self.shared, layer)),
+            Ok(Command::Beside { layer }) => self.beside = layer.map(|layer| Look::at(&self.shared, layer)),
+            Ok(Command::Gaze { at }) => {
+                let is_place = |at: &[f64; 2]| at.iter().all(|place| place.is_finite());
+                self.pointer.look_at(at.filter(is_place).map(|[x_px, y_px]| Gaze { x_px, y_px }));
+            }
+            Ok(Command::Inspect { x, y }) => return inspected(&self.shared, x, y),
+            Ok(command) => self.shared.send(command),
+            Err(error) => return Some(not_understood(&error)),
+        }
+        None
+    }
+}
+
 /// Serves one viewer until it goes, or the preview closes and it has the last frame. It is sent the latest frame whenever it has taken
 /// the one before.
 pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
-    let mut look = Some(Look::at(&shared, Layer::Picture));
-    let mut beside: Option<Look> = None;
-    let mut pointer = Pointer::of(&shared);
     let mut status = shared.status();
     let mut closing = shared.until_closing();
+    let mut viewer = Viewer::of(shared);
     status.mark_changed();
     loop {
         let answer = tokio::select! {
             said = socket.recv() => match said {
-                Some(Ok(Message::Text(text))) => match serde_json::from_str(&text) {
-                    Ok(Command::Layer { layer }) => {
-                        look = Some(Look::at(&shared, layer));
-                        None
-                    }
-                    Ok(Command::Beside { layer }) => {
-                        beside = layer.map(|layer| Look::at(&shared, layer));
-                        None
-                    }
-                    Ok(Command::Gaze { at }) => {
-                        let is_place = |at: &[f64; 2]| at.iter().all(|place| place.is_finite());
-                        pointer.look_at(at.filter(is_place).map(|[x_px, y_px]| Gaze { x_px, y_px }));
-                        None
-                    }
-                    Ok(Command::Inspect { x, y }) => inspected(&shared, x, y).map(|text| Message::Text(text.into())),
-                    Ok(command) => {
-                        shared.send(command);
-                        None
-                    }
-                    Err(error) => Some(Message::Text(not_understood(&error).into())),
-                },
+                Some(Ok(Message::Text(text))) => viewer.heed(&text).map(|answer| Message::Text(answer.into())),
                 Some(Ok(Message::Close(_)) | Err(_)) | None => return,
                 Some(Ok(_)) => None,
             },
-            frame = next_frame(&mut look) => (!frame.is_empty()).then_some(Message::Binary(frame)),
-            frame = next_frame(&mut beside) => (!frame.is_empty()).then_some(Message::Binary(frame)),
+            frame = next_frame(&mut viewer.look) => (!frame.is_empty()).then_some(Message::Binary(frame)),
+            frame = next_frame(&mut viewer.beside) => (!frame.is_empty()).then_some(Message::Binary(frame)),
             Ok(()) = status.changed() => {
                 let text = status.borrow_and_update().to_string();
                 (!text.is_empty()).then(|| Message::Text(text.into()))
@@ -92,7 +101,8 @@ pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
             return;
         }
     }
-    let last_frames = [look, beside].into_iter().flatten().filter_map(|mut look| look.unsent()).map(Message::Binary);
+    let looks = [&mut viewer.look, &mut viewer.beside];
+    let last_frames = looks.into_iter().flatten().filter_map(Look::unsent).map(Message::Binary);
     let last_status = status.borrow_and_update().to_string();
     let last_status = Some(last_status).filter(|text| !text.is_empty()).map(|text| Message::Text(text.into()));
     for message in last_frames.chain(last_status).chain([Message::Close(None)]) {

@@ -151,6 +151,12 @@ struct Profile {
     weight: Vec<f32>,
 }
 
+/// A sample along one axis.
+struct AxisSample {
+    offset_px: f32,
+    weight: f32,
+}
+
 impl Profile {
     /// Cells of 1/512 of the width: no picture shows them.
     const CELLS: usize = 512;
@@ -171,17 +177,16 @@ impl Profile {
     }
 
     fn sample(&self, u: f32, v: f32) -> FilterSample {
-        let ((x, weight_x), (y, weight_y)) = (self.axis(u), self.axis(v));
-        FilterSample { offset: Vec2::new(x, y), weight: weight_x * weight_y }
+        let [x, y] = [u, v].map(|u| self.axis(u));
+        FilterSample { offset: Vec2::new(x.offset_px, y.offset_px), weight: x.weight * y.weight }
     }
 
-    /// Offset along one axis and its weight.
-    fn axis(&self, u: f32) -> (f32, f32) {
+    fn axis(&self, u: f32) -> AxisSample {
         let cell = self.cumulative.partition_point(|&c| c <= u).clamp(1, Self::CELLS) - 1;
         let span = self.cumulative[cell + 1] - self.cumulative[cell];
         let within = if span > 0.0 { ((u - self.cumulative[cell]) / span).clamp(0.0, 1.0) } else { 0.5 };
         let place = 2.0 * (cell as f32 + within) / Self::CELLS as f32 - 1.0;
-        (self.radius_px * place, self.weight[cell])
+        AxisSample { offset_px: self.radius_px * place, weight: self.weight[cell] }
     }
 }
 
@@ -229,7 +234,7 @@ mod tests {
                 let expected: f64 = (0..STEPS).map(weighted).sum::<f64>() / total;
                 let seen = (0..STEPS)
                     .map(|i| profile.axis(share(i) as f32))
-                    .map(|(x, weight)| f64::from(weight) * function(f64::from(x)))
+                    .map(|sample| f64::from(sample.weight) * function(f64::from(sample.offset_px)))
                     .sum::<f64>()
                     / f64::from(STEPS);
                 assert!((seen - expected).abs() < 1e-3, "{filter:?}: {seen} {expected}");

@@ -1,5 +1,6 @@
 //! Adaptive and uniform renders of the Cornell box against a reference: energy, calibration, determinism.
 
+use crate::support::command;
 use crate::support::{loop_settings, trace_settings};
 use fechner::adaptive::audit::audit;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
@@ -11,7 +12,6 @@ use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::model::{ModelInputs, ThresholdModel};
 use fechner_perception::{Error, Plane};
-use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -20,8 +20,7 @@ use std::time::Duration;
 const NITS_PER_UNIT: f64 = 120.0;
 
 fn cornell_box() -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
-    load(&path, &LoadOptions::default()).expect("the first scene loads")
+    load(&command::cornell_box(), &LoadOptions::default()).expect("the first scene loads")
 }
 
 fn render_cornell(

@@ -1,6 +1,6 @@
 //! `fechner animate`: the same frames in any order and from any process, kept when they are there.
 
-use assert_cmd::Command;
+use crate::support::command::fechner;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -41,13 +41,8 @@ fn animate(folder: &Path, arguments: &[&str]) -> String {
 /// The same with another scene.
 fn animate_scene(folder: &Path, scene: &str, arguments: &[&str]) -> String {
     std::fs::write(folder.join("scene.toml"), scene).expect("written");
-    let output = Command::cargo_bin("fechner")
-        .expect("the binary is built")
-        .current_dir(folder)
-        .args(["animate", "scene.toml"])
-        .args(arguments)
-        .output()
-        .expect("it starts");
+    let output =
+        fechner().current_dir(folder).args(["animate", "scene.toml"]).args(arguments).output().expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}");
     said
@@ -322,7 +317,7 @@ fn bad_arguments_are_named() {
         (&["--frames", "0..2", "-o", "a.#.png", "--eye", "gaze"], "--gaze says where viewers look"),
         (&["--frames", "0..2", "-o", "a.#.png", "--velocity-of", "image"], "PNG frames hold no motion"),
     ] {
-        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut command = fechner();
         let output = command
             .current_dir(folder.path())
             .args(["animate", "scene.toml"])
@@ -344,7 +339,7 @@ fn sequences_are_compared_as_they_move() {
     animate(at, &["--frames", "0..3", "--fps", "24", "--spp", "4", "-o", "a.##.exr"]);
     animate(at, &["--frames", "0..3", "--fps", "24", "--spp", "4", "--seed", "7", "-o", "b.##.exr"]);
     let compare = |arguments: &[&str]| {
-        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut command = fechner();
         let output = command.current_dir(at).arg("compare").args(arguments).output().expect("it starts");
         let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         (output.status.code(), said)
@@ -388,7 +383,7 @@ fn the_last_frames_are_compared() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     animate(at, &["--frames", "4294967294..4294967295", "--spp", "16", "-o", "a.##.exr"]);
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    let mut command = fechner();
     let output = command.current_dir(at).args(["compare", "a.##.exr", "a.##.exr", "--fps", "24"]).output();
     let output = output.expect("it starts");
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
@@ -402,7 +397,7 @@ fn a_gaze_table_says_something_of_the_shot() {
     std::fs::write(at.join("scene.toml"), SCENE).expect("written");
     let say = |table: &str, eye: &str| {
         std::fs::write(at.join("gaze.csv"), table).expect("written");
-        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut command = fechner();
         let asked = ["--frames", "0..1", "--spp", "16", "--gaze", "gaze.csv", "--eye", eye, "-o", "a.##.png"];
         let output = command.current_dir(at).args(["animate", "scene.toml"]).args(asked).output().expect("it starts");
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
@@ -439,7 +434,7 @@ fn a_sequence_for_the_display_is_compared_with_one_of_light() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let worst = |files: [&str; 2], more: &[&str]| {
-        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut command = fechner();
         let arguments = ["compare", files[0], files[1], "--fps", "24", "--json", "figures.json"];
         let output = command.current_dir(at).args([&arguments[..], more].concat()).output().expect("it starts");
         assert!(output.status.code() < Some(2), "{}", String::from_utf8_lossy(&output.stderr));
@@ -567,7 +562,7 @@ fn a_budget_is_the_whole_shots() {
     assert!(!alone.path().join("out/shot.contact.png").exists());
     // By time, uniform: the scene's visibility, reached at once, is not what ends it.
     std::fs::write(at_once.path().join("easy.toml"), format!("{SCENE}[view]\nvisibility = 50.0\n")).expect("written");
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    let mut command = fechner();
     command.args([
         "animate",
         "easy.toml",

@@ -1,6 +1,6 @@
 //! Shots that cannot be, or are not what was meant: refused before anything is rendered, or named.
 
-use assert_cmd::Command;
+use crate::support::command::{fechner, said};
 use fechner::exr_read::read_exr;
 use std::path::Path;
 
@@ -31,14 +31,13 @@ const CAMERA: &str = "position = [0, 0, 5]\nlook_at = [0, 0, 0]";
 /// Runs `animate`, cheaply; its exit status and what it said.
 fn animate(folder: &Path, scene: &str, arguments: &[&str]) -> (Option<i32>, String) {
     std::fs::write(folder.join("scene.toml"), scene).expect("written");
-    let output = Command::cargo_bin("fechner")
-        .expect("the binary is built")
+    let output = fechner()
         .current_dir(folder)
         .args(["animate", "scene.toml", "--visibility", "50", "--max-spp", "16"])
         .args(arguments)
         .output()
         .expect("it starts");
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    (output.status.code(), said(&output))
 }
 
 /// A camera that looks along its up in the frame after the last: the shot was refused when all but its last frame were rendered.
@@ -126,8 +125,7 @@ fn stereo_frames_have_files_of_their_own() {
         }
         assert!(!folder.path().join(format!("s.{file}")).exists(), "{file}");
     }
-    let threshold = Command::cargo_bin("fechner")
-        .expect("the binary is built")
+    let threshold = fechner()
         .current_dir(folder.path())
         .args(["threshold", "s.01.left.exr", "-o", "t.exr", "--model", "yee", "--velocity", "s.01.left.exr"])
         .output()

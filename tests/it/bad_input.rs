@@ -1,5 +1,6 @@
 //! Bad scene files end in one line that says what is wrong; every file of `tests/bad` holds its own expectation.
 
+use crate::support::command::assert_refused;
 use fechner::scene::load::{LoadOptions, load};
 use std::path::Path;
 
@@ -246,11 +247,9 @@ fn pipes_in_the_place_of_textures_are_not_waited_for() {
                  Material \"conductor\" \"texture roughness\" \"t\"\nShape \"sphere\"\n";
     for (name, text) in [("rough.xml", rough.as_str()), ("masked.xml", &masked), ("metal.pbrt", metal)] {
         std::fs::write(folder.path().join(name), text).unwrap();
-        let mut command = assert_cmd::Command::cargo_bin("fechner").unwrap();
-        command.current_dir(folder.path()).args(["render", name, "--size", "8x8", "--spp", "1", "-o", "a.png"]);
-        let output = command.timeout(std::time::Duration::from_secs(60)).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{name}: {said}");
-        assert!(said.contains("pipe.png: is not a regular file"), "{name}: {said}");
+        let mut command = std::process::Command::new("timeout");
+        command.current_dir(folder.path()).args(["60", env!("CARGO_BIN_EXE_fechner"), "render", name]);
+        command.args(["--size", "8x8", "--spp", "1", "-o", "a.png"]);
+        assert_refused(&mut command, &["pipe.png: is not a regular file"]);
     }
 }

@@ -1,12 +1,12 @@
 //! The benchmark from end to end, as small as it gets.
 
-use assert_cmd::Command;
+use crate::support::command::{cornell_box, fechner, repository_scene};
 use std::path::{Path, PathBuf};
 
 fn bench(output: &Path, more: &[&str]) -> std::process::Output {
-    let scene: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
-    command.arg("bench").arg(scene).args(["--size", "32", "--visibility", "12", "--reference-factor", "4", "-o"]);
+    let mut command = fechner();
+    command.arg("bench").arg(cornell_box());
+    command.args(["--size", "32", "--visibility", "12", "--reference-factor", "4", "-o"]);
     command.arg(output).args(more).output().expect("runs")
 }
 
@@ -107,14 +107,14 @@ fn damaged_files_are_made_anew() {
 #[test]
 fn scenes_of_one_name_are_told_apart() {
     let folder = tempfile::tempdir().expect("a folder");
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml"));
+    let text = std::fs::read_to_string(cornell_box());
     let text = text.expect("there");
     for (name, reflectance) in [("light", "[0.74, 0.73, 0.70]"), ("dark", "[0.2, 0.2, 0.2]")] {
         std::fs::create_dir(folder.path().join(name)).expect("made");
         let text = text.replace("[0.74, 0.73, 0.70]", reflectance);
         std::fs::write(folder.path().join(name).join("box.toml"), text).expect("written");
     }
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    let mut command = fechner();
     command.args(["bench", "light/box.toml", "dark/box.toml", "--size", "32", "--visibility", "12"]);
     command.args(["--reference-factor", "4", "--seeds", "1", "--arms", "uniform,tvi", "-o", "out"]);
     let run = command.current_dir(folder.path()).output().expect("runs");
@@ -160,8 +160,8 @@ fn no_rule_beats_the_bound() {
 #[test]
 fn denoisers_of_shots_are_opened_first() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/rolling-ball.toml");
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    let scene = repository_scene("rolling-ball.toml");
+    let mut command = fechner();
     command.arg("bench").arg(scene).args([
         "--suite",
         "animation",
@@ -182,13 +182,13 @@ fn denoisers_of_shots_are_opened_first() {
 #[test]
 fn scenes_are_judged_at_their_own_exposure() {
     let folder = tempfile::tempdir().expect("a folder");
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml"));
+    let text = std::fs::read_to_string(cornell_box());
     let text = text.expect("there");
     std::fs::write(folder.path().join("plain.toml"), &text).expect("written");
     let dim = text.replace("[view]\n", "[view]\nexposure_stops = -4.0\n");
     assert_ne!(dim, text);
     std::fs::write(folder.path().join("dim.toml"), dim).expect("written");
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    let mut command = fechner();
     command.args(["bench", "plain.toml", "dim.toml", "--size", "32", "--visibility", "4", "--bound", "-o", "out"]);
     let run = command.current_dir(folder.path()).output().expect("runs");
     let table = String::from_utf8_lossy(&run.stdout).into_owned();
@@ -212,7 +212,7 @@ fn scenes_without_noise_or_light_have_tables() {
         std::fs::write(folder.path().join(name), [camera, parts, far].concat()).expect("written");
     }
     let run = |more: &[&str]| {
-        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut command = fechner();
         command.args(["bench", "flat.toml", "black.toml", "--size", "32", "--reference-factor", "0.25"]);
         command.args(["-o", "out"]).args(more).current_dir(folder.path());
         let run = command.output().expect("runs");
@@ -241,8 +241,8 @@ fn scenes_without_noise_or_light_have_tables() {
 fn names_of_scenes_are_quoted() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = folder.path().join("a, <b> & 'c'.toml");
-    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml"), &scene).expect("copied");
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    std::fs::copy(cornell_box(), &scene).expect("copied");
+    let mut command = fechner();
     command.arg("bench").arg(&scene).args([
         "--size",
         "32",
@@ -277,8 +277,8 @@ fn denoised_renders_are_not_made_twice() {
 #[test]
 fn the_suite_animation_writes_its_rows() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/rolling-ball.toml");
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    let scene = repository_scene("rolling-ball.toml");
+    let mut command = fechner();
     command.arg("bench").arg(scene).args(["--suite", "animation", "--size", "32", "--fps", "24", "--visibility", "12"]);
     let run = command.args(["--reference-factor", "1", "-o"]).arg(folder.path().join("out")).output().expect("runs");
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
@@ -294,7 +294,7 @@ fn the_suite_animation_writes_its_rows() {
 #[test]
 fn what_cannot_be_run_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    let scene = cornell_box();
     let again = scene.with_file_name("../scenes/cornell-box.toml").display().to_string();
     for (arguments, why) in [
         (
@@ -313,7 +313,7 @@ fn what_cannot_be_run_is_refused() {
         assert!(!folder.path().join("out").exists(), "{arguments:?}: something was written");
     }
     for suite in [&["quick"][..], &["denoise", "--denoise", "builtin"], &["animation"]] {
-        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut command = fechner();
         command.args(["bench", "nosuch.toml", "-o", "out", "--suite"]).args(suite).current_dir(folder.path());
         let refused = command.output().expect("runs");
         let said = String::from_utf8_lossy(&refused.stderr).into_owned();

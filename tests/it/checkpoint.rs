@@ -1,5 +1,6 @@
 //! Renders that were stopped, killed, continued and merged, against renders in one go.
 
+use crate::support::command::{self, repository_scene};
 use crate::support::{loop_settings, trace_settings};
 use fechner::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::state::RenderState;
@@ -23,8 +24,7 @@ use std::sync::{Arc, Mutex};
 const SIZE: u32 = 40;
 
 fn cornell_box() -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
-    load(&path, &LoadOptions::default()).expect("the first scene loads")
+    load(&command::cornell_box(), &LoadOptions::default()).expect("the first scene loads")
 }
 
 struct Setup {
@@ -122,7 +122,7 @@ fn a_render_that_is_continued_equals_one_in_one_go() {
 /// So it is where looks at a denoised picture are far apart: the one that ended the first part is the straight way's, too.
 #[test]
 fn a_denoised_render_that_is_continued_equals_one_in_one_go() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/product.toml");
+    let path = repository_scene("product.toml");
     let scene = load(&path, &LoadOptions::default()).expect("our own scene");
     let nits_per_unit = scene.nits_per_unit;
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(48, 48, 0));

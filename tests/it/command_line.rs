@@ -1,33 +1,16 @@
 //! The program as a user runs it: good runs leave whole files, bad input leaves one line and nothing else.
 
-use assert_cmd::Command;
-use std::path::{Path, PathBuf};
+use crate::support::command::{self, cornell_box, fechner};
+use std::path::Path;
 
-fn fechner() -> Command {
-    Command::cargo_bin("fechner").expect("the binary is built")
-}
-
-fn scene(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
-}
-
-/// Runs and expects exit status 2, and one line about it on stderr with all the `fragments`, the last one.
 fn assert_refused(arguments: &[&str], folder: &Path, fragments: &[&str]) {
-    let output = fechner().args(arguments).current_dir(folder).output().expect("runs");
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    for fragment in fragments {
-        assert!(message.contains(fragment), "{arguments:?}: \"{fragment}\" is not in: {message}");
-    }
-    let errors = message.lines().filter(|line| line.starts_with("fechner:")).count();
-    assert!(errors == 1 && message.lines().last().is_some_and(|line| line.starts_with("fechner:")), "{message}");
-    assert!(!message.contains("panicked"), "{message}");
+    command::assert_refused(fechner().args(arguments).current_dir(folder), fragments);
 }
 
 #[test]
 fn a_render_leaves_a_picture_and_its_figures() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = scene("cornell-box.toml");
+    let scene = cornell_box();
     let arguments = ["--size", "24x16", "--visibility", "8", "--json", "out.json", "-o"];
     for name in ["out.png", "out.exr"] {
         let run = fechner()
@@ -101,8 +84,7 @@ fn a_render_leaves_a_picture_and_its_figures() {
 fn plans_repeat_what_time_ended() {
     let folder = tempfile::tempdir().expect("a folder");
     // Asked for so little that it is reached at once: not what ends a uniform render of so many plans.
-    let text =
-        std::fs::read_to_string(scene("cornell-box.toml")).expect("there").replace("visibility = 2", "visibility = 50");
+    let text = std::fs::read_to_string(cornell_box()).expect("there").replace("visibility = 2", "visibility = 50");
     std::fs::write(folder.path().join("easy.toml"), text).expect("written");
     for sampling in ["uniform", "budget"] {
         let rendered = |limit: [&str; 2]| {
@@ -128,7 +110,7 @@ fn endless_times_are_no_limit() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = fechner()
         .arg("render")
-        .arg(scene("cornell-box.toml"))
+        .arg(cornell_box())
         .args(["--size", "16x16", "--spp", "4", "-o", "a.png", "--time", "1e20", "--checkpoint", "a.film"])
         .args(["--checkpoint-every", "1e20"])
         .current_dir(folder.path())
@@ -143,7 +125,7 @@ fn a_crop_of_a_huge_picture_fits_into_memory() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = fechner()
         .arg("render")
-        .arg(scene("cornell-box.toml"))
+        .arg(cornell_box())
         .args(["--size", "40000x40000", "--crop", "20000,20000,16,16", "--spp", "4", "-o", "a.png"])
         .current_dir(folder.path())
         .output()
@@ -159,7 +141,7 @@ fn a_crop_is_exposed_as_the_whole() {
     let render = |name: &str, more: &[&str]| {
         let run = fechner()
             .arg("render")
-            .arg(scene("cornell-box.toml"))
+            .arg(cornell_box())
             .args(["--size", "96x96", "--sampling", "uniform", "--spp", "16", "-o", name])
             .args(more)
             .current_dir(folder.path())
@@ -185,7 +167,7 @@ fn a_crop_is_exposed_as_the_whole() {
 fn merging_keeps_alpha_and_films() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |arguments: &[&str]| fechner().args(arguments).current_dir(folder.path()).output().expect("runs");
-    let dark = scene("cornell-box.toml");
+    let dark = cornell_box();
     let dark = dark.to_str().expect("text");
     let render =
         ["render", dark, "--size", "16x16", "--spp", "4", "-o", "a.exr", "--transparent", "--checkpoint", "a.film"];
@@ -206,7 +188,7 @@ fn merging_keeps_alpha_and_films() {
 #[test]
 fn a_render_of_few_samples_makes_no_claim() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = scene("cornell-box.toml");
+    let scene = cornell_box();
     let told = |spp: &str, film: &str, more: &[&str]| {
         let arguments = ["--size", "24x24", "--json", "out.json", "-o", "out.png", "--checkpoint", film, "--spp", spp];
         let run = fechner().arg("render").arg(&scene).args(arguments).args(more).current_dir(folder.path()).output();
@@ -236,7 +218,7 @@ fn a_render_of_few_samples_makes_no_claim() {
 #[test]
 fn rivals_aim_at_no_visibility() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = scene("cornell-box.toml");
+    let scene = cornell_box();
     for rule in ["relative", "variance", "budget"] {
         let film = format!("{rule}.film");
         let arguments = ["--size", "24x24", "--spp", "18", "--sampling", rule, "--json", "a.json", "-o", "a.exr"];
@@ -260,7 +242,7 @@ fn rivals_aim_at_no_visibility() {
 #[test]
 fn bad_arguments_are_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
-    let cornell = scene("cornell-box.toml");
+    let cornell = cornell_box();
     let cornell = cornell.to_str().expect("text");
     let at = folder.path();
     assert_refused(&["render", "missing.toml", "-o", "a.png"], at, &["missing.toml"]);
@@ -329,7 +311,7 @@ fn bad_arguments_are_refused_in_one_line() {
 fn pictures_are_compared_and_thresholds_mapped() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
-    let scene = scene("cornell-box.toml");
+    let scene = cornell_box();
     for seed in ["1", "2"] {
         let name = format!("{seed}.exr");
         let run = fechner()
@@ -475,7 +457,7 @@ fn oblong_pixels_of_a_file_are_honoured() {
 #[test]
 fn impossible_pictures_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = scene("cornell-box.toml");
+    let scene = cornell_box();
     let scene = scene.to_str().expect("a plain path");
     let with = |extra: &[&'static str]| {
         let mut arguments = vec!["render", scene, "-o", "out.png", "--size", "32x32"];

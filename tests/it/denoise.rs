@@ -1,7 +1,7 @@
 //! Denoised pictures as a user gets them.
 
+use crate::support::command::{self, cornell_box, fechner};
 use crate::support::{loop_settings, trace_settings};
-use assert_cmd::Command;
 use fechner::adaptive::audit::{Audit, audit, audit_unproven};
 use fechner::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings, Sampling};
 use fechner::adaptive::state::RenderState;
@@ -22,14 +22,9 @@ use std::sync::Arc;
 /// Renders the Cornell box at 48×48 with these arguments.
 fn render(folder: &Path, file: &str, arguments: &[&str]) -> Vec<u8> {
     let path = folder.join(file);
-    Command::cargo_bin("fechner")
-        .expect("the program")
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(["render", "scenes/cornell-box.toml", "--size", "48x48", "-o"])
-        .arg(&path)
-        .args(arguments)
-        .assert()
-        .success();
+    let mut command = fechner();
+    command.arg("render").arg(cornell_box()).args(["--size", "48x48", "-o"]).arg(&path).args(arguments);
+    command::run(&mut command);
     std::fs::read(path).expect("a picture")
 }
 
@@ -57,7 +52,7 @@ fn the_raw_mean_stays_beside_the_denoised_picture() {
 #[test]
 fn the_summary_says_nothing_of_what_is_not_there() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut command = Command::cargo_bin("fechner").expect("the program");
+    let mut command = fechner();
     command.args([
         "render",
         "scenes/cornell-glass.toml",
@@ -80,8 +75,7 @@ fn the_summary_says_nothing_of_what_is_not_there() {
 fn no_part_of_the_error_is_more_than_the_whole() {
     let folder = tempfile::tempdir().expect("a folder");
     let (picture, json) = (folder.path().join("a.exr"), folder.path().join("a.json"));
-    let output = Command::cargo_bin("fechner")
-        .expect("the program")
+    let output = fechner()
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .args(["render", "scenes/glass-caustic.toml", "--size", "96x72", "--spp", "128"])
         .args(["--sampling", "uniform", "--denoise", "builtin", "-o"])
@@ -127,7 +121,7 @@ fn threads_change_no_byte_of_a_denoised_render() {
 /// A render that leaves off after some plan, between two looks too, and goes on is the one that never did.
 #[test]
 fn a_denoised_render_may_leave_off_between_looks() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    let path = cornell_box();
     let scene = Arc::new(load(&path, &LoadOptions::default()).expect("loads"));
     let settings = |plans: Option<u32>| {
         let settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 2.0, Some(40));
@@ -148,7 +142,7 @@ fn a_denoised_render_may_leave_off_between_looks() {
 /// Where something shines is known: the box's lamp, and nothing that it lights.
 #[test]
 fn lamps_are_known() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    let path = cornell_box();
     let scene = Arc::new(load(&path, &LoadOptions::default()).expect("loads"));
     let tracer = PathTracer::new(scene, trace_settings(48, 48, 1));
     let mut film = Film::new(48, 48);
@@ -164,8 +158,7 @@ fn lamps_are_known() {
 fn a_library_that_is_not_there_is_asked_for() {
     let folder = tempfile::tempdir().expect("a folder");
     let picture = folder.path().join("a.png");
-    let output = Command::cargo_bin("fechner")
-        .expect("the program")
+    let output = fechner()
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .env("OIDN_DIR", folder.path())
         .args(["render", "scenes/cornell-box.toml", "--size", "16x16", "--denoise", "oidn", "-o"])
@@ -269,7 +262,7 @@ impl DenoisedScene {
 /// What matters half as much may show twice as much of either part of the error, in the file as in the stop.
 #[test]
 fn importance_goes_for_both_parts_of_the_error() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    let path = cornell_box();
     let scene = Arc::new(load(&path, &LoadOptions::default()).expect("loads"));
     let parts = |importance: Option<Plane>| {
         let settings = loop_settings(scene.nits_per_unit, Sampling::Uniform, None, Some(4));

@@ -1,7 +1,7 @@
 //! `fechner compare` and `threshold` see what the display shows: colours that it clips, PQ and sRGB files, rods, acuity, the
 //! room's light.
 
-use assert_cmd::Command;
+use crate::support::command;
 use fechner::exr_read::read_exr;
 use fechner::output::{Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, Picture, write_exr, write_png};
 use std::path::Path;
@@ -9,8 +9,7 @@ use std::path::Path;
 pub(crate) const SIDE: usize = 64;
 
 pub(crate) fn fechner(folder: &Path, arguments: &[&str]) -> (i32, String) {
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
-    let output = command.args(arguments).current_dir(folder).output().expect("runs");
+    let output = command::fechner().args(arguments).current_dir(folder).output().expect("runs");
     let said = [output.stdout, output.stderr].concat();
     (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&said).into_owned())
 }
@@ -243,7 +242,7 @@ fn a_picture_looks_like_its_own_png() {
 #[test]
 fn a_render_is_seen_as_it_was_judged() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let scene = &command::cornell_box().display().to_string();
     for (name, how) in [("dimmed", &["--exposure", "-2"][..]), ("adapted", &["--operator", "pattanaik00"])] {
         for ending in ["exr", "png"] {
             let common = ["render", scene, "--size", "48x48", "--spp", "16", "-o"];
@@ -306,7 +305,7 @@ fn a_display_that_is_told_goes_before_a_guess() {
     let display =
         "name = 'mine'\npixels_per_degree = 110\nwhite_cd_m2 = 600\nblack_cd_m2 = 0.4\nambient_cd_m2 = 30\neotf = 'pq'";
     std::fs::write(folder.path().join("my.toml"), display).expect("written");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let scene = &command::cornell_box().display().to_string();
     for name in ["a.exr", "a.png"] {
         let common = ["render", scene, "--size", "32x32", "--spp", "16", "--display", "my.toml", "-o", name];
         run(folder.path(), &common);
@@ -364,7 +363,7 @@ fn the_shape_of_pixels_is_kept_in_a_png() {
 #[test]
 fn nothing_is_rendered_for_pixels_that_are_not_square() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let scene = &command::cornell_box().display().to_string();
     std::fs::write(folder.path().join("wide.toml"), "name = 'wide'\npixel_aspect_ratio = 2.0").expect("written");
     let (code, said) =
         fechner(folder.path(), &["render", scene, "-o", "a.png", "--size", "8x8", "--display", "wide.toml"]);
@@ -380,7 +379,7 @@ fn nothing_is_rendered_for_pixels_that_are_not_square() {
 #[test]
 fn a_render_is_seen_on_its_own_display() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let scene = &command::cornell_box().display().to_string();
     for name in ["a.exr", "a.png"] {
         let common = ["render", scene, "--size", "32x32", "--spp", "16", "--operator", "absolute", "-o", name];
         run(folder.path(), &[&common[..], &["--display", "hdr-1000"]].concat());
@@ -399,7 +398,7 @@ fn a_render_is_seen_on_its_own_display() {
 #[test]
 fn a_render_is_seen_on_a_display_of_ones_own() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let scene = &command::cornell_box().display().to_string();
     for (file, display) in [
         ("near.toml", "preset = 'phone'\npixels_per_degree = 20.0"),
         ("wide.toml", "preset = 'desktop'\ncsf_area_deg2 = 7.0"),

@@ -1,25 +1,22 @@
 //! `fechner farm`: many processes on one folder make the bytes of one process, whatever happens to them.
 
+use crate::support::command::{self, repository_scene, said};
 #[cfg(unix)]
 use crate::support::{signal, wait_for};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 
 /// The still that is rendered here: as one process, and as farms.
 pub(crate) const OPTIONS: [&str; 6] = ["--size", "48x48", "--visibility", "4", "--seed", "3"];
 
 pub(crate) fn fechner(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+    let mut command = command::fechner();
     command.args(arguments).current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }
 
 pub(crate) fn scene() -> String {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml").display().to_string()
-}
-
-pub(crate) fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    command::cornell_box().display().to_string()
 }
 
 /// Runs and expects this exit status; what it said.
@@ -207,7 +204,7 @@ fn a_unit_goes_on_from_its_checkpoint() {
 fn frames_are_those_of_animate() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/rolling-ball.toml").display().to_string();
+    let scene = repository_scene("rolling-ball.toml").display().to_string();
     let options = ["--fps", "12", "--size", "32x18", "--visibility", "8"];
     let animate = ["animate", &scene, "--frames", "4..6", "-o", "whole/frame.####.exr"];
     run(at, 0, &[&animate[..], &options].concat());
@@ -235,7 +232,7 @@ fn kept_films_are_those_of_their_frames() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     std::fs::write(at.join("gaze.csv"), "6,10,20\n").expect("written");
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/light-switch.toml").display().to_string();
+    let scene = repository_scene("light-switch.toml").display().to_string();
     let plan = ["farm", "plan", &scene, "--frames", "5..6", "--keep-films", "--format", "png", "-o", "farm", "--"];
     let how = ["--size", "48x27", "--visibility", "4"];
     run(at, 0, &[&plan[..], &how, &["--shot", "5..10", "--gaze", "gaze.csv"]].concat());

@@ -1,6 +1,7 @@
 //! `fechner farm` where a file is lost, a command was interrupted or what is asked for cannot be.
 
-use crate::farm::{OPTIONS, fechner, file, is_done, missing, one_process, picture, plan, run, said, scene};
+use crate::farm::{OPTIONS, fechner, file, is_done, missing, one_process, picture, plan, run, scene};
+use crate::support::command::{repository_scene, said};
 #[cfg(unix)]
 use crate::support::{signal, wait_for};
 use std::path::{Path, PathBuf};
@@ -125,7 +126,7 @@ fn a_merge_that_traces_goes_on_from_its_film() {
 
 /// A shot of three frames in a folder whose name has a place for numbers.
 fn plan_shot(at: &Path, options: &[&str]) -> (i32, String) {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/rolling-ball.toml").display().to_string();
+    let scene = repository_scene("rolling-ball.toml").display().to_string();
     let plan = ["farm", "plan", &scene, "--frames", "4..6", "--unit-samples", "1000", "-o", "a#b/farm", "--"];
     let arguments = [&plan[..], &["--size", "32x18", "--visibility", "8"], options].concat();
     let output = fechner(at, &arguments).output().expect("runs");

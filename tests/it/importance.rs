@@ -1,6 +1,6 @@
 //! Samples go where a user's map sends them, and the film remembers by which map.
 
-use assert_cmd::Command;
+use crate::support::command::{cornell_box, fechner};
 use fechner::exr_read::{ExrImage, read_exr};
 use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr};
 use std::path::Path;
@@ -9,9 +9,8 @@ use std::process::Output;
 const SIZE: usize = 48;
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
-    command.arg("render").arg(scene).args(["--size", "48x48", "--visibility", "4", "--display", "strict"]);
+    let mut command = fechner();
+    command.arg("render").arg(cornell_box()).args(["--size", "48x48", "--visibility", "4", "--display", "strict"]);
     command.args(arguments).current_dir(folder).output().expect("runs")
 }
 
@@ -83,7 +82,7 @@ fn a_film_remembers_its_map() {
     let told = String::from_utf8_lossy(&again.stderr).into_owned();
     assert!(!told.contains("other settings"), "{told}");
     let merge = ["merge", "a.film", "-o", "merged.png"];
-    let merged = Command::cargo_bin("fechner").expect("the binary is built").args(merge).current_dir(at).output();
+    let merged = fechner().args(merge).current_dir(at).output();
     let told = String::from_utf8_lossy(&merged.expect("runs").stderr).into_owned();
     assert!(told.contains("note: sampled under an importance map"), "{told}");
     let without = run(at, &[&["-o", "c.exr", "--resume"], &film[..]].concat());

@@ -1,19 +1,12 @@
 //! The program, killed and interrupted, resumed and merged: as a farm or a power cut would do it.
 
+use crate::support::command::{assert_refused, cornell_box, fechner, repository_scene, run, said};
 #[cfg(unix)]
 use crate::support::signal;
 use crate::support::wait_for;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::Duration;
-
-fn fechner() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_fechner"))
-}
-
-fn scene() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml")
-}
 
 fn render(folder: &Path, arguments: &[&str]) -> Command {
     render_sized(folder, "64x64", arguments)
@@ -21,29 +14,9 @@ fn render(folder: &Path, arguments: &[&str]) -> Command {
 
 fn render_sized(folder: &Path, size: &str, arguments: &[&str]) -> Command {
     let mut command = fechner();
-    command.arg("render").arg(scene()).args(["--size", size]).args(arguments).current_dir(folder);
+    command.arg("render").arg(cornell_box()).args(["--size", size]).args(arguments).current_dir(folder);
     command.stdout(Stdio::null()).stderr(Stdio::piped());
     command
-}
-
-fn text(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn run(mut command: Command) -> String {
-    let output = command.output().expect("runs");
-    assert!(output.status.success(), "{}", text(&output));
-    text(&output)
-}
-
-/// Runs and expects exit status 2 and one line with all the fragments.
-fn assert_refused(mut command: Command, fragments: &[&str]) {
-    let output = command.output().expect("runs");
-    let message = text(&output);
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    let line = message.lines().find(|line| line.starts_with("fechner:")).unwrap_or_default();
-    assert!(fragments.iter().all(|fragment| line.contains(fragment)), "{fragments:?} are not in: {message}");
-    assert!(!message.contains("panicked"), "{message}");
 }
 
 fn file(folder: &Path, name: &str) -> Vec<u8> {
@@ -67,7 +40,7 @@ fn a_killed_render_resumes_to_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let whole = ["-o", "whole.exr"];
-    run(render(at, &[&UNTIL[..], &whole].concat()));
+    run(&mut render(at, &[&UNTIL[..], &whole].concat()));
 
     let parts = ["-o", "parts.exr", "--checkpoint", "a.film", "--checkpoint-every", "0.001"];
     let parts = [&UNTIL[..], &parts].concat();
@@ -77,7 +50,7 @@ fn a_killed_render_resumes_to_the_same_bytes() {
     child.kill().expect("SIGKILL");
     assert!(!child.wait().expect("ended").success());
     assert!(!at.join("parts.exr").exists(), "the kill came too late to show anything");
-    assert_refused(render(at, &parts), &["a.film", "--resume"]);
+    assert_refused(&mut render(at, &parts), &["a.film", "--resume"]);
     // As a kill leaves what it cuts short.
     for written in ["parts.exr", "a.film"] {
         std::fs::write(at.join(format!(".{written}.x1Y2z3.part")), "half").expect("written");
@@ -92,7 +65,7 @@ fn a_killed_render_resumes_to_the_same_bytes() {
     child.kill().expect("SIGKILL");
     child.wait().expect("ended");
 
-    let message = run(render(at, &resumed));
+    let message = said(&run(&mut render(at, &resumed)));
     assert!(message.contains("Checkpoint a.film"), "{message}");
     assert!(file(at, "parts.exr") == file(at, "whole.exr"), "the resumed picture differs");
     assert_eq!(names(at), ["a.film", "parts.exr", "whole.exr"], "something was left behind");
@@ -106,12 +79,12 @@ fn a_killed_shot_goes_on_to_the_same_bytes() {
     let (whole, parts) = (whole.path(), parts.path());
     let shot = |folder: &Path| {
         let mut command = fechner();
-        command.arg("animate").arg(scene().with_file_name("rolling-ball.toml")).current_dir(folder);
+        command.arg("animate").arg(repository_scene("rolling-ball.toml")).current_dir(folder);
         command.args(["--frames", "0..7", "--size", "48x27", "--visibility", "3", "-o", "shot.#.exr"]);
         command.args(["--video", "shot.y4m"]).stdout(Stdio::null()).stderr(Stdio::piped());
         command
     };
-    run(shot(whole));
+    run(&mut shot(whole));
     let mut child = shot(parts).spawn().expect("runs");
     wait_for(&parts.join("shot.1.json"), &mut child);
     child.kill().expect("SIGKILL");
@@ -127,7 +100,7 @@ fn a_killed_shot_goes_on_to_the_same_bytes() {
     for written in ["shot.0.exr", "shot.7.exr", "shot.7.json", "shot.json", "shot.contact.png", "shot.y4m"] {
         std::fs::write(parts.join(format!(".{written}.x1Y2z3.part")), "half").expect("written");
     }
-    let message = run(shot(parts));
+    let message = said(&run(&mut shot(parts)));
     assert_eq!(message.matches(": is there").count(), done.len(), "{message}");
     assert!(done.iter().all(|picture| message.contains(&format!("{picture}: is there"))), "{message}");
     assert_eq!(names(parts), names(whole), "something was left behind");
@@ -143,7 +116,7 @@ fn a_signal_ends_a_shot_between_whole_frames() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let mut command = fechner();
-    command.arg("animate").arg(scene()).args([
+    command.arg("animate").arg(cornell_box()).args([
         "--size",
         "32x32",
         "--frames",
@@ -157,8 +130,8 @@ fn a_signal_ends_a_shot_between_whole_frames() {
     wait_for(&at.join("f.0000.json"), &mut child);
     signal(&child, "-INT");
     let output = child.wait_with_output().expect("ended");
-    assert_eq!(output.status.code(), Some(75), "{}", text(&output));
-    assert!(text(&output).contains("the same command makes the others"), "{}", text(&output));
+    assert_eq!(output.status.code(), Some(75), "{}", said(&output));
+    assert!(said(&output).contains("the same command makes the others"), "{}", said(&output));
     assert_eq!(image::open(at.join("f.0000.png")).expect("a picture").width(), 32);
 }
 
@@ -170,11 +143,11 @@ fn a_film_that_was_traced_otherwise_says_how() {
         let common = ["--spp", "4", "--max-depth", depth, "-o", "a.png", "--checkpoint", "a.film"];
         render(folder.path(), &[&common[..], more].concat())
     };
-    run(with("3", &[]));
+    run(&mut with("3", &[]));
     let output = with("5", &["--resume"]).output().expect("runs");
-    let said = text(&output);
-    assert!(said.contains("traced with max depth 3, and these are with max depth 5"), "{said}");
-    assert!(!said.contains("clamp"), "{said}");
+    let message = said(&output);
+    assert!(message.contains("traced with max depth 3, and these are with max depth 5"), "{message}");
+    assert!(!message.contains("clamp"), "{message}");
 }
 
 #[cfg(unix)]
@@ -190,8 +163,8 @@ fn a_signal_ends_a_render_with_its_picture_so_far() {
         signal(&child, "-TERM");
     }
     let output = child.wait_with_output().expect("ended");
-    assert_eq!(output.status.code(), Some(75), "{}", text(&output));
-    assert!(text(&output).contains("Stopped by a signal"), "{}", text(&output));
+    assert_eq!(output.status.code(), Some(75), "{}", said(&output));
+    assert!(said(&output).contains("Stopped by a signal"), "{}", said(&output));
     assert_eq!(image::open(at.join("a.png")).expect("a picture").width(), 64);
     let json: serde_json::Value = serde_json::from_slice(&file(at, "a.json")).expect("JSON");
     assert_eq!(json["stop_reason"], "interrupted");
@@ -218,7 +191,7 @@ fn a_picture_whose_folder_is_gone_is_kept_elsewhere() {
     std::fs::remove_dir_all(&gone).expect("removed");
     signal(&child, "-TERM");
     let output = child.wait_with_output().expect("ended");
-    let message = text(&output);
+    let message = said(&output);
     assert_eq!(output.status.code(), Some(2), "{message}");
     let [own] = &names(&temporary)[..] else { panic!("no folder: {message}") };
     let kept = temporary.join(own).join("a.png");
@@ -235,39 +208,39 @@ fn films_are_merged_and_judged_again() {
     let spent = ["--sampling", "uniform", "--visibility", "4", "--spp", "32", "-o", "x.png"];
     for seed in ["1", "2"] {
         let film = format!("{seed}.film");
-        run(render(at, &[&spent[..], &["--seed", seed, "--checkpoint", &film]].concat()));
+        run(&mut render(at, &[&spent[..], &["--seed", seed, "--checkpoint", &film]].concat()));
     }
     let merge = |arguments: &[&str]| {
         let mut command = fechner();
         command.arg("merge").args(arguments).current_dir(at).stderr(Stdio::piped());
         command
     };
-    let message = run(merge(&["1.film", "2.film", "-o", "sum.exr", "--json", "sum.json"]));
+    let message = said(&run(&mut merge(&["1.film", "2.film", "-o", "sum.exr", "--json", "sum.json"])));
     assert!(message.contains("seeds 1, 2") && message.contains("above the target visibility 4"), "{message}");
-    run(merge(&["2.film", "1.film", "-o", "mus.exr"]));
+    run(&mut merge(&["2.film", "1.film", "-o", "mus.exr"]));
     assert!(file(at, "sum.exr") == file(at, "mus.exr"), "the order of the films changes the picture");
     let json: serde_json::Value = serde_json::from_slice(&file(at, "sum.json")).expect("JSON");
     assert_eq!((&json["samples_total"], &json["seeds"]), (&(64 * 64 * 64).into(), &serde_json::json!([1, 2])));
     // One film's picture without another sample is the one that its render made.
-    run(merge(&["2.film", "-o", "again.png"]));
+    run(&mut merge(&["2.film", "-o", "again.png"]));
     assert!(file(at, "again.png") == file(at, "x.png"));
 
-    run(merge(&["1.film", "2.film", "-o", "sum.film"]));
+    run(&mut merge(&["1.film", "2.film", "-o", "sum.film"]));
     let on = ["--visibility", "4", "--spp", "128", "-o", "x.png", "--checkpoint", "sum.film", "--resume", "--seed"];
-    assert_refused(render(at, &[&on[..], &["2"]].concat()), &["sum.film", "1, 2"]);
-    run(render(at, &[&on[..], &["3"]].concat()));
-    assert_refused(merge(&["sum.film", "2.film", "-o", "y.exr"]), &["2.film", "sum.film", "seed 2"]);
-    assert_refused(merge(&["1.film", "1.film", "-o", "y.exr"]), &["1.film", "seed 1"]);
-    assert_refused(merge(&["1.film", "x.png", "-o", "y.exr"]), &["x.png", "not a film"]);
-    assert_refused(merge(&["1.film", "-o", "y.gif"]), &["y.gif"]);
+    assert_refused(&mut render(at, &[&on[..], &["2"]].concat()), &["sum.film", "1, 2"]);
+    run(&mut render(at, &[&on[..], &["3"]].concat()));
+    assert_refused(&mut merge(&["sum.film", "2.film", "-o", "y.exr"]), &["2.film", "sum.film", "seed 2"]);
+    assert_refused(&mut merge(&["1.film", "1.film", "-o", "y.exr"]), &["1.film", "seed 1"]);
+    assert_refused(&mut merge(&["1.film", "x.png", "-o", "y.exr"]), &["x.png", "not a film"]);
+    assert_refused(&mut merge(&["1.film", "-o", "y.gif"]), &["y.gif"]);
 
     let resumed = ["-o", "z.png", "--checkpoint", "1.film", "--resume", "--spp", "64", "--seed"];
-    assert_refused(render(at, &[&resumed[..], &["5"]].concat()), &["1.film", "--seed 1"]);
-    assert_refused(render_sized(at, "32x64", &[&resumed[..], &["1"]].concat()), &["1.film", "64x64", "32x64"]);
-    assert_refused(render(at, &[&resumed[..], &["1", "--clamp", "9"]].concat()), &["1.film", "clamp"]);
+    assert_refused(&mut render(at, &[&resumed[..], &["5"]].concat()), &["1.film", "--seed 1"]);
+    assert_refused(&mut render_sized(at, "32x64", &[&resumed[..], &["1"]].concat()), &["1.film", "64x64", "32x64"]);
+    assert_refused(&mut render(at, &[&resumed[..], &["1", "--clamp", "9"]].concat()), &["1.film", "clamp"]);
     let short = file(at, "1.film");
     std::fs::write(at.join("cut.film"), &short[..short.len() - 100]).expect("written");
-    assert_refused(merge(&["cut.film", "2.film", "-o", "y.exr"]), &["cut.film", "damaged"]);
+    assert_refused(&mut merge(&["cut.film", "2.film", "-o", "y.exr"]), &["cut.film", "damaged"]);
     assert!(
         names(at).iter().all(|name| !name.starts_with('.') && name != "y.exr" && name != "z.png"),
         "{:?}",

@@ -1,12 +1,11 @@
 //! Maps beside a picture: `render --map LAYER=FILE`.
 
-use assert_cmd::Command;
+use crate::support::command::{cornell_box, fechner};
 use std::path::Path;
 
 fn render(arguments: &[&str], folder: &Path) -> std::process::Output {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
-    command.arg("render").arg(scene).args(["--size", "24x16"]).args(arguments).current_dir(folder);
+    let mut command = fechner();
+    command.arg("render").arg(cornell_box()).args(["--size", "24x16"]).args(arguments).current_dir(folder);
     command.output().expect("runs")
 }
 

@@ -1,8 +1,8 @@
 //! What goes wrong around a command: nobody listens any more, a disk is full, a file is asked for twice.
 
-use assert_cmd::cargo::cargo_bin;
+use crate::support::command::{self, said};
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 /// A scene that is rendered in a moment.
 const SPHERE: &str = "[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 45\n\n\
@@ -16,16 +16,12 @@ fn folder() -> tempfile::TempDir {
 }
 
 fn fechner(folder: &Path) -> Command {
-    let mut command = Command::new(cargo_bin("fechner"));
+    let mut command = command::fechner();
     command.current_dir(folder);
     command
 }
 
 const RENDER: [&str; 6] = ["render", "s.toml", "--size", "16x16", "--visibility", "2"];
-
-fn words(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
 
 /// Where nobody reads what it says, a render still keeps its samples and writes its picture; where nobody reads an answer any more,
 /// the exit status is what it would have been.
@@ -66,7 +62,7 @@ fn an_answer_that_is_lost_is_told() {
         let full = full.try_clone().expect("a handle");
         let output = fechner(folder.path()).args(arguments).stdout(full).output().expect("runs");
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(words(&output).contains("cannot write to standard output"), "{}", words(&output));
+        assert!(said(&output).contains("cannot write to standard output"), "{}", said(&output));
     }
 }
 
@@ -79,13 +75,16 @@ fn what_cannot_be_written_keeps_nothing_else() {
     let script = r#"ulimit -f 4; exec "$0" "$@""#;
     let render = |size: &str, others: &[&str]| {
         let mut command = Command::new("sh");
-        command.current_dir(folder.path()).args(["-c", script]).arg(cargo_bin("fechner"));
+        command.current_dir(folder.path()).args(["-c", script]).arg(command::fechner().get_program());
         let output =
             command.args(["render", "s.toml", "--size", size, "--spp", "16"]).args(others).output().expect("runs");
-        assert_eq!(output.status.code(), Some(2), "{}", words(&output));
-        let words = words(&output);
-        assert!(words.contains("samples (16.0 a pixel on average") && !words.contains("rendering goes on"), "{words}");
-        words.lines().last().expect("an error").to_owned()
+        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+        let message = said(&output);
+        assert!(
+            message.contains("samples (16.0 a pixel on average") && !message.contains("rendering goes on"),
+            "{message}"
+        );
+        message.lines().last().expect("an error").to_owned()
     };
     let error = render("8x8", &["-o", "a.png", "--checkpoint", "a.film"]);
     assert!(error.contains("a.film: File too large") && folder.path().join("a.png").exists(), "{error}");
@@ -110,7 +109,7 @@ fn figures_that_are_lost_take_nothing_along() {
     std::fs::remove_dir(&figures).expect("removed");
     let output = child.wait_with_output().expect("ended");
     assert_eq!(output.status.code(), Some(2));
-    let words = words(&output);
+    let words = said(&output);
     assert!(words.contains("Stopped because") && words.contains("the picture is in a.png"), "{words}");
     let error = words.lines().last().expect("an error");
     assert!(error.contains("figures/a.json: ") && error.contains("figures/a.png: "), "{words}");
@@ -140,7 +139,7 @@ fn outputs_replace_no_texture() {
         &["animate", "c.toml", "--size", "8x8", "--spp", "4", "--frames", "0..1", "-o", "c.#.png"],
     ] {
         let output = fechner(folder.path()).args(arguments).output().expect("runs");
-        let said = words(&output);
+        let said = said(&output);
         assert!(output.status.code() == Some(2) && said.contains("that the scene is made of"), "{arguments:?}: {said}");
         for texture in &textures {
             assert_eq!(std::fs::read(texture).expect("there"), before, "{arguments:?}");
@@ -187,7 +186,7 @@ fn outputs_replace_no_inputs() {
     for (arguments, refusal) in cases {
         let output = fechner(folder.path()).args(arguments).output().expect("runs");
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(words(&output).contains(refusal), "{arguments:?}: {}", words(&output));
+        assert!(said(&output).contains(refusal), "{arguments:?}: {}", said(&output));
     }
     assert!(read.iter().zip(before).all(|(path, before)| std::fs::read(path).is_ok_and(|now| now == before)));
 }
@@ -202,7 +201,7 @@ fn names_are_not_changed() {
     let name = std::ffi::OsStr::from_bytes(b"t\xff.##.png");
     let mut command = fechner(folder.path());
     let output = command.args(["tonemap", "a.exr", "--operator", "agx", "-o"]).arg(name).output().expect("runs");
-    assert!(words(&output).contains("must be UTF-8"), "{}", words(&output));
+    assert!(said(&output).contains("must be UTF-8"), "{}", said(&output));
 }
 
 /// A film is written by one process at a time, and another is told by which.
@@ -220,11 +219,11 @@ fn a_film_has_one_writer() {
         || fechner(folder.path()).args(RENDER).args(["-o", "b.png", "--checkpoint", "./a.film", "--resume"]).output();
     let refused = second().expect("runs");
     assert_eq!(refused.status.code(), Some(2));
-    assert!(words(&refused).contains(&format!("process {} writes this film", child.id())), "{}", words(&refused));
+    assert!(said(&refused).contains(&format!("process {} writes this film", child.id())), "{}", said(&refused));
     child.kill().expect("killed");
     child.wait().expect("ended");
     let other_size = second().expect("runs");
-    assert!(words(&other_size).contains("64x64"), "free after a kill: {}", words(&other_size));
+    assert!(said(&other_size).contains("64x64"), "free after a kill: {}", said(&other_size));
 }
 
 /// A film's picture names the scene as the render's own does.
@@ -248,7 +247,7 @@ fn a_film_beside_the_ladder_is_told() {
     let render = |visibility: &str, others: &[&str]| {
         let mut command = fechner(folder.path());
         command.args(["render", "s.toml", "--size", "16x16", "-o", "a.png", "--visibility", visibility]).args(others);
-        words(&command.output().expect("runs"))
+        said(&command.output().expect("runs"))
     };
     let note = "note: the film aimed at visibility 4, which a render to 0.5 does not pass";
     let resumed = |from: &str, to: &str, film: &str, denoise: &str| {
@@ -275,7 +274,7 @@ fn a_seed_is_entered_with_its_first_sample() {
             ["render", "s.toml", "--size", "16x16", "-o", "a.png", "--sampling", "uniform", "--json", "a.json"];
         let own = ["--seed", seed, "--spp", spp, "--checkpoint", film];
         let output = run(&[&arguments[..], &own, more].concat());
-        assert!(output.status.success(), "{}", words(&output));
+        assert!(output.status.success(), "{}", said(&output));
         let figures = std::fs::read(folder.path().join("a.json")).expect("written");
         serde_json::from_slice::<serde_json::Value>(&figures).expect("JSON")["seeds"].clone()
     };

@@ -1,6 +1,7 @@
 //! What Mitsuba's sensors see; figures are those of Mitsuba 3.9.
 
-use crate::mitsuba_format::{LIGHT, folder, has_note, scene};
+use crate::mitsuba_format::{LIGHT, folder, scene};
+use crate::support::has_note;
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{FilmDefaults, Projection, ScreenWindow};
 use glam::{Vec2, Vec3};

@@ -1,5 +1,6 @@
 //! What Mitsuba's files mean; figures are those of Mitsuba 3.9.
 
+use crate::support::{has_note, write_and_load};
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Alpha, Material, Scene, Surface};
 use glam::{Vec2, Vec3};
@@ -24,9 +25,7 @@ pub(crate) fn folder() -> tempfile::TempDir {
 }
 
 pub(crate) fn try_load(folder: &Path, version: &str, body: &str) -> Result<Scene, String> {
-    let path = folder.join("scene.xml");
-    std::fs::write(&path, format!("<scene version=\"{version}\">{body}</scene>")).unwrap();
-    load(&path, &LoadOptions::default()).map_err(|error| error.to_string())
+    write_and_load(&folder.join("scene.xml"), format!("<scene version=\"{version}\">{body}</scene>"))
 }
 
 pub(crate) fn scene(body: &str) -> Scene {
@@ -36,10 +35,6 @@ pub(crate) fn scene(body: &str) -> Scene {
 pub(crate) fn material(bsdf: &str) -> Material {
     let scene = scene(&format!(r#"<shape type="rectangle">{bsdf}</shape>"#));
     scene.materials[scene.instances[0].material.0 as usize].clone()
-}
-
-pub(crate) fn has_note(scene: &Scene, text: &str) -> bool {
-    scene.notes.iter().any(|note| note.contains(text))
 }
 
 /// A sky's luminance is ours, in cd/m², whatever RGB 1 is taken as.

@@ -1,6 +1,7 @@
 //! Colours, numbers, pictures and spectra of Mitsuba's files; figures are those of Mitsuba 3.9.
 
-use crate::mitsuba_format::{LIGHT, folder, has_note, material, scene, try_load};
+use crate::mitsuba_format::{LIGHT, folder, material, scene, try_load};
+use crate::support::has_note;
 use fechner::scene::{Alpha, Surface};
 use glam::{Vec2, Vec3};
 

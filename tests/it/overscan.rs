@@ -1,6 +1,6 @@
 //! Files whose data reach beyond what is to be shown.
 
-use assert_cmd::Command;
+use crate::support::command::{cornell_box, fechner};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes,
     Vec2, WritableImage,
@@ -23,7 +23,7 @@ fn motion_fits_its_own_picture() {
     let threshold = ["threshold", "a.00.exr", "--velocity", "a.00.exr", "-o", "out.exr"];
     let compare = ["compare", "a.##.exr", "a.##.exr", "--velocity", "a.##.exr", "--fps", "24"];
     for arguments in [&threshold[..], &compare[..]] {
-        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut command = fechner();
         command.args(arguments).args(["--nits-per-unit", "1"]).current_dir(folder.path());
         let output = command.output().expect("runs");
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
@@ -34,9 +34,9 @@ fn motion_fits_its_own_picture() {
 #[test]
 fn a_crop_lies_where_it_belongs() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml").display().to_string();
+    let scene = cornell_box().display().to_string();
     let run = |arguments: &[&str]| {
-        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut command = fechner();
         let output = command.args(arguments).current_dir(folder.path()).output().expect("runs");
         assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8_lossy(&output.stdout).into_owned()

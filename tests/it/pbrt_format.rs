@@ -1,5 +1,6 @@
 //! What pbrt's files mean.
 
+use crate::support::write_and_load;
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Alpha, FilmDefaults, Projection, Scene, ScreenWindow, Surface};
 use fechner_perception::eotf::srgb_to_linear;
@@ -20,10 +21,9 @@ fn folder() -> tempfile::TempDir {
 }
 
 fn try_load(folder: &Path, head: &str, world: &str) -> Result<Scene, String> {
-    let path = folder.join("scene.pbrt");
     let film = r#"Film "rgb" "integer xresolution" 32 "integer yresolution" 32"#;
-    std::fs::write(&path, format!("{head} {film} WorldBegin LightSource \"infinite\"\n{world}\n")).unwrap();
-    load(&path, &LoadOptions::default()).map_err(|error| error.to_string())
+    let text = format!("{head} {film} WorldBegin LightSource \"infinite\"\n{world}\n");
+    write_and_load(&folder.join("scene.pbrt"), text)
 }
 
 fn scene(head: &str, world: &str) -> Scene {

@@ -1,8 +1,11 @@
 //! Scenes made in code, and rendering them.
 
+pub(crate) mod command;
+
 use fechner::adaptive::settings::{Limits, LoopSettings, Sampling, THRESHOLD};
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::sampler::{BlockKey, Half, Pixel, PixelFilter, Sequence};
+use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{
     Alpha, Camera, ColorInput, Environment, FilmDefaults, Instance, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
     Surface,
@@ -125,6 +128,17 @@ pub(crate) fn loop_settings(
     let operator = tone::operator("constant", None).expect("an operator");
     let limits = Limits { visibility: visibility.into(), mean_samples: spp, ..Limits::of_visibility(THRESHOLD) };
     LoopSettings { sampling, limits, ..LoopSettings::new(viewing, nits_per_unit, operator) }
+}
+
+/// Loads a scene file of such content; what went wrong.
+pub(crate) fn write_and_load(file: &Path, content: impl AsRef<[u8]>) -> Result<Scene, String> {
+    std::fs::write(file, content).expect("written");
+    load(file, &LoadOptions::default()).map_err(|error| error.to_string())
+}
+
+/// Whether one of a scene's notes says so.
+pub(crate) fn has_note(scene: &Scene, part: &str) -> bool {
+    scene.notes.iter().any(|note| note.contains(part))
 }
 
 /// Until a file is there that a program under way makes.

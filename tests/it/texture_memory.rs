@@ -1,6 +1,6 @@
 //! `--texture-memory`: textures within a limit, and a note that says so.
 
-use assert_cmd::Command;
+use crate::support::command::fechner;
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Scene, Texels};
 use std::path::PathBuf;
@@ -56,7 +56,7 @@ fn textures_keep_to_the_limit() {
 fn render_takes_the_limit_in_megabytes() {
     let folder = tempfile::tempdir().unwrap();
     let run = |limit: &str| {
-        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut command = fechner();
         command.args([
             "render",
             "--size",

@@ -1,6 +1,7 @@
 //! What `fechner compare` and `threshold` say of pictures that they refuse, or heed in part.
 
 use crate::displayed::{SIDE, fechner, run, write};
+use crate::support::command::cornell_box;
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, WritableImage as _};
 use fechner::exr_read::read_exr;
 use fechner::output::{Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, Picture, write_exr, write_png};
@@ -71,7 +72,7 @@ fn an_audit_of_no_noise_says_so() {
 #[test]
 fn one_is_told_as_one() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let scene = &cornell_box().display().to_string();
     let film = ["--checkpoint", "a.film"];
     let one = ["render", scene, "-o", "a.png", "--size", "1x1", "--sampling", "uniform", "--spp", "1"];
     for arguments in [&[&one[..], &film].concat()[..], &["info", "a.film"]] {
@@ -87,7 +88,7 @@ fn one_is_told_as_one() {
 #[test]
 fn what_tells_nothing_of_noise_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let scene = &cornell_box().display().to_string();
     let render = |more: &[&str]| {
         let common = ["render", scene, "--sampling", "uniform", "--json", "j.json"];
         run(folder.path(), &[&common[..], more].concat());

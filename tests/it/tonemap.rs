@@ -1,6 +1,6 @@
 //! `fechner tonemap`: sheets, sequences in time, HDR displays, and what it refuses.
 
-use assert_cmd::Command;
+use crate::support::command::fechner;
 use fechner::exr_read::read_exr;
 use fechner::output::{
     Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, PartOf, Picture, png_pixel_aspect_ratio, write_exr,
@@ -8,8 +8,7 @@ use fechner::output::{
 use std::path::Path;
 
 fn tonemap(folder: &Path, arguments: &[&str]) -> std::process::Output {
-    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
-    command.arg("tonemap").args(arguments).current_dir(folder).output().expect("runs")
+    fechner().arg("tonemap").args(arguments).current_dir(folder).output().expect("runs")
 }
 
 fn run(folder: &Path, arguments: &[&str]) -> String {
@@ -150,7 +149,7 @@ fn a_transparent_exr_is_shown_as_its_png() {
         let [direct, via] = ["direct.png", "via.png"]
             .map(|name| image::open(folder.path().join(name)).expect("a picture").into_rgba8());
         assert_eq!(direct, via, "{display}");
-        let mut compare = Command::cargo_bin("fechner").expect("the binary is built");
+        let mut compare = fechner();
         let said =
             compare.args(["compare", "via.exr", "direct.png"]).current_dir(folder.path()).output().expect("runs");
         assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stdout));

@@ -1,9 +1,10 @@
 //! The live preview as a browser meets it: over HTTP and a WebSocket.
 
+use crate::support::command::{cornell_box, fechner};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -15,10 +16,6 @@ mod requests;
 
 /// Anything that takes longer hangs.
 const PATIENCE: Duration = Duration::from_secs(120);
-
-fn cornell_box() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml")
-}
 
 /// `fechner view` under way; ended when dropped.
 struct View {
@@ -35,7 +32,7 @@ impl View {
     }
 
     fn of_size(size: &str, scene: &Path, folder: &Path, arguments: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+        let mut command = fechner();
         command.arg("view").arg(scene).args(["--size", size, "--threads", "1"]).args(arguments);
         let mut child = command.current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("runs");
         let said = child.stdout.take().expect("piped");
@@ -44,7 +41,7 @@ impl View {
 
     /// `fechner render --view` under way.
     fn of_render(folder: &Path, arguments: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+        let mut command = fechner();
         command.arg("render").arg(cornell_box()).args(["--view", "--size", "32x32", "--threads", "1"]).args(arguments);
         let mut child = command.current_dir(folder).stderr(Stdio::piped()).spawn().expect("runs");
         let said = child.stderr.take().expect("piped");
@@ -173,7 +170,7 @@ fn is_stopped(status: &Value) -> bool {
 }
 
 fn rendered(folder: &Path, arguments: &[&str], name: &str) -> Vec<u8> {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+    let mut command = fechner();
     command.arg("render").arg(cornell_box()).args(["--size", "32x32", "-o", name]).args(arguments).current_dir(folder);
     let output = command.output().expect("runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -263,7 +260,7 @@ fn a_part_is_as_bright_as_its_whole_from_another_camera() {
 
     let copied = with_camera(&cornell_box(), moved["camera"].as_str().expect("TOML"));
     std::fs::write(folder.path().join("moved.toml"), copied).expect("written");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+    let mut command = fechner();
     command.args(["render", "moved.toml", "--size", "32x32", "-o", "moved.png"]).args(arguments);
     assert!(command.current_dir(folder.path()).output().expect("runs").status.success());
     let [saved, rendered] = ["cornell-box-1.png", "moved.png"]
@@ -396,10 +393,9 @@ fn a_render_shows_itself_and_is_not_driven() {
 fn a_picture_too_wide_for_a_browser_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     for command in [&["view"][..], &["render", "--view", "-o", "a.png", "--spp", "1", "--sampling", "uniform"]] {
-        let mut fechner = Command::new(env!("CARGO_BIN_EXE_fechner"));
-        let scene = cornell_box();
-        fechner.args(command).arg(&scene).args(["--size", "65536x1"]).current_dir(folder.path());
-        let mut child = fechner.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("runs");
+        let mut refused = fechner();
+        refused.args(command).arg(cornell_box()).args(["--size", "65536x1"]).current_dir(folder.path());
+        let mut child = refused.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("runs");
         let mut said = child.stderr.take().expect("piped");
         let started = Instant::now();
         let status = loop {
@@ -453,7 +449,7 @@ fn tev_changes_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let render_for = |address: &str, name: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+        let mut command = fechner();
         command.arg("render").arg(cornell_box()).args([
             "--size",
             "32x32",

@@ -1,5 +1,6 @@
 //! Files as other programs write them: what they mean is read, what is left out is named, and nothing sound is refused.
 
+use crate::support::{has_note, write_and_load};
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Alpha, Material, MetalRoughness, Scene, Surface};
 
@@ -7,18 +8,14 @@ const QUAD: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1
 
 fn read(files: &[(&str, &[u8])]) -> Result<Scene, String> {
     let place = tempfile::tempdir().unwrap();
-    for (name, bytes) in files {
+    for (name, bytes) in &files[1..] {
         std::fs::write(place.path().join(name), bytes).unwrap();
     }
-    load(&place.path().join(files[0].0), &LoadOptions::default()).map_err(|error| error.to_string())
+    write_and_load(&place.path().join(files[0].0), files[0].1)
 }
 
 fn scene(files: &[(&str, &[u8])]) -> Scene {
     read(files).unwrap_or_else(|error| panic!("{error}"))
-}
-
-fn has_note(scene: &Scene, part: &str) -> bool {
-    scene.notes.iter().any(|note| note.contains(part))
 }
 
 /// The scene of a quad of one MTL material.

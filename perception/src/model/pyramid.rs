@@ -47,17 +47,16 @@ pub(crate) fn band_frequency_cpd(band: usize, pixels_per_degree: f64) -> f64 {
         }
 }
 
-/// Threshold map of the models that weigh each band's elevation by its share of the local contrast: the base threshold at each
+/// Threshold map of the models that weigh each band's elevation by its share of the local contrast: the `base` threshold at each
 /// pixel's adaptation luminance times `factor(Σ C_i f_i / Σ C_i)`, where `elevation_at(x, y, adaptation, band, C_i)` is f_i. A picture
 /// without contrast has no weights: nothing is elevated.
 pub(crate) fn contrast_weighted(
     inputs: &ModelInputs<'_>,
-    raw_tvi: bool,
+    base: ThresholdBase<'_>,
     factor: impl Fn(f32) -> f32 + Sync,
     elevation_at: impl Fn(usize, usize, f32, usize, f32) -> f32 + Sync,
 ) -> Plane {
     let gain = inputs.viewing.observer.sensitivity;
-    let base = if raw_tvi { ThresholdBase::TviRaw } else { ThresholdBase::CsfPeak(inputs.csf) };
     let thresholds = PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
     let contrasts = band_contrasts(inputs.display_luminance_cd_m2);
     let mut allowed = adapted(inputs.display_luminance_cd_m2, inputs.viewing);

@@ -6,6 +6,7 @@ use crate::csf::peak_sensitivity;
 use crate::error::Error;
 use crate::masking::threshold_elevation;
 use crate::plane::Plane;
+use crate::tvi::ThresholdBase;
 
 /// "A perceptually based physical error metric for realistic image synthesis", SIGGRAPH 1999: T = TVI(`L_a`) · F, where
 /// F = Σ (`C_i`/ΣC) · (`S_max`/S(`ρ_i`)) · mask(`C_i` S(`ρ_i`)) raises the threshold where the picture's contrast lies off the peak of
@@ -47,7 +48,8 @@ impl ThresholdModel for Ramasubramanian {
             })
             .collect();
         let factor = |elevation: f32| elevation.clamp(*FACTOR.start(), *FACTOR.end());
-        Ok(contrast_weighted(inputs, self.raw_tvi, factor, |_, _, adaptation, band, contrast| {
+        let base = if self.raw_tvi { ThresholdBase::TviRaw } else { ThresholdBase::CsfPeak(inputs.csf) };
+        Ok(contrast_weighted(inputs, base, factor, |_, _, adaptation, band, contrast| {
             let mask = f64::from(contrast * sensitivities[band].at(adaptation));
             elevations[band] * threshold_elevation(mask) as f32
         }))

@@ -5,6 +5,7 @@ use super::{ModelInputs, PerLuminance, ThresholdModel};
 use crate::csf::{DRIFT_DEG_S, Daly98};
 use crate::error::Error;
 use crate::plane::Plane;
+use crate::tvi::ThresholdBase;
 
 /// "Spatiotemporal sensitivity and visual attention for efficient rendering of dynamic environments", ACM TOG 20(1),
 /// 2001: the Aleph map, ℵ = TVI(`L_a`) · Σ `R_i` `f_i` with `R_i` the share of band i in the local contrast and
@@ -57,9 +58,10 @@ impl ThresholdModel for Yee {
             .map(|band| PerLuminance::new(|velocity| self.elevation(band_frequency_cpd(band, ppd), velocity)))
             .collect();
         let velocity = inputs.retinal_velocity_deg_s();
+        let base = if self.raw_tvi { ThresholdBase::TviRaw } else { ThresholdBase::CsfPeak(inputs.csf) };
         Ok(contrast_weighted(
             inputs,
-            self.raw_tvi,
+            base,
             |elevation| elevation.max(1.0),
             |x, y, _, band, _| {
                 let retinal = velocity.as_ref().map_or(DRIFT_DEG_S as f32, |velocity| velocity.row(y)[x]);

@@ -8,7 +8,7 @@
 //! A tile is looked at through a window that fades to nothing at its borders, for the eye's filters would see an edge there
 //! (Welch 1967).
 
-use super::{Audit, FreshSamples, LEAST_TILES, STRATUM, Tile, choose_tiles, is_large_enough, ratio_of_sums};
+use super::{Audit, Energy, FreshSamples, LEAST_TILES, STRATUM, Tile, choose_tiles, is_large_enough};
 use crate::adaptive::judge::{JudgeError, Judgement};
 use crate::adaptive::settings::LoopSettings;
 use crate::film::{Film, HalfPixel, Halves};
@@ -68,10 +68,9 @@ pub fn audit_unproven(
     let energies = tiles.iter().map(|tile| {
         // v² is twice the amplitude's square.
         let found = 2.0 * (tile.energy(&difference) - tile.energy(&noise));
-        (found, tile.energy(&predicted))
+        Energy { found, predicted: tile.energy(&predicted) }
     });
-    let (ratio, standard_error) = ratio_of_sums(&energies.collect::<Vec<_>>());
-    Ok(Some(Audit { tiles: tiles.len(), samples: fresh.samples, ratio, standard_error }))
+    Ok(Some(Audit::of(&energies.collect::<Vec<_>>(), fresh.samples)))
 }
 
 /// What fresh samples say of a pixel, in scene units.

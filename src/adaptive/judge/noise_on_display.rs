@@ -15,8 +15,7 @@ pub fn variance_share(film: &Film, pixel: usize) -> f64 {
 
 /// The same of every pixel.
 pub fn variance_shares(film: &Film) -> Plane {
-    let width = film.width() as usize;
-    Plane::from_fn(width, film.height() as usize, |x, y| variance_share(film, y * width + x) as f32)
+    film.plane(|pixel| variance_share(film, pixel) as f32)
 }
 
 /// What the display makes of noise.

@@ -6,10 +6,9 @@
 
 use super::super::settings::LoopSettings;
 use super::steps::{Guide, Scatter, Thresholds, found_thresholds};
-use super::{JudgeError, Purpose, variance_share};
+use super::{JudgeError, Purpose, variance_share, without_noise};
 use crate::film::Film;
 use fechner_perception::Plane;
-use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::tone::FittedTone;
 use fechner_perception::visibility::MeasuredError;
 
@@ -106,33 +105,23 @@ impl WorsePerSample<'_> {
 }
 
 fn ground_half_difference(film: &Film, ground_cd_m2: f64) -> Plane {
-    let width = film.width() as usize;
-    Plane::from_fn(width, film.height() as usize, |x, y| {
+    film.plane(|pixel| {
         // Less coverage is more light.
-        let uncovered = film.halves(y * width + x).half_difference(|half| -f64::from(half.coverage()));
+        let uncovered = film.halves(pixel).half_difference(|half| -f64::from(half.coverage()));
         uncovered as f32 * ground_cd_m2 as f32
     })
 }
 
 /// Coverage without its noise, which would mask itself.
 fn guide_coverage(film: &Film) -> Plane {
-    let (width, height) = (film.width() as usize, film.height() as usize);
     let coverage = film.coverage();
-    let variance = Plane::from_fn(width, height, |x, y| {
-        let (pixel, covered) = (y * width + x, f64::from(coverage[y * width + x]));
+    let variance = film.plane(|pixel| {
+        let covered = f64::from(coverage[pixel]);
         (covered * (1.0 - covered) * variance_share(film, pixel)) as f32
     });
-    let guides = film.guides();
     let rgb: Vec<[f32; 3]> = coverage.iter().map(|&covered| [covered; 3]).collect();
-    let found = denoise(&GuideInputs {
-        rgb: &rgb,
-        variance: &variance,
-        // Coverage is no light that falls on a surface.
-        albedo: &vec![[1.0; 3]; width * height],
-        normal: &guides.iter().map(|guide| guide.normal).collect::<Vec<_>>(),
-        depth: &guides.iter().map(|guide| guide.depth).collect::<Vec<_>>(),
-        width,
-        height,
-    });
-    Plane::from_fn(width, height, |x, y| found[y * width + x][0].clamp(0.0, 1.0))
+    // Coverage is no light that falls on a surface.
+    let albedo = vec![[1.0; 3]; coverage.len()];
+    let found = without_noise(film, &rgb, &variance, &albedo);
+    film.plane(|pixel| found[pixel][0].clamp(0.0, 1.0))
 }

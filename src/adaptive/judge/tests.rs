@@ -2,8 +2,8 @@ use super::*;
 use crate::adaptive::is_reached;
 use crate::adaptive::test_films::{film_of, film_of_halves, film_of_lamps, settings};
 use crate::denoise::Denoiser;
-use crate::film::BlockSum;
-use crate::integrator::{BlockWork, FirstHit, PathSample};
+use crate::film::film_of_samples;
+use crate::integrator::{FirstHit, PathSample};
 use crate::sampler::hash_words;
 use fechner_perception::tone::SceneLight;
 use glam::Vec3;
@@ -181,20 +181,13 @@ fn light_beyond_all_numbers_is_seen() {
 /// A black disc's border, half of whose samples meet nothing: before black there is nothing to see, and before white a lot.
 #[test]
 fn noise_of_alpha_is_seen_over_white() {
-    let mut film = Film::new(64, 64);
-    for pixel in 0..64 * 64u32 {
-        for half in Half::BOTH {
-            let mut sum = BlockSum::default();
-            for index in 0..8 {
-                let key = u64::from(pixel) << 8 | index;
-                let is_border = (24..40).contains(&(pixel % 64));
-                let object_id = u32::from(!is_border || hash_words(key, half.index() as u64) >> 63 == 0);
-                let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id, shines: false };
-                sum.add(&PathSample { radiance: Vec3::ZERO, first_hit, rays: 1 });
-            }
-            film.merge_block(BlockWork { samples: 8, ..BlockWork::whole(pixel, half, 0) }, &sum);
-        }
-    }
+    let film = film_of_samples([64, 64], [8; 2], |pixel, half, index| {
+        let key = u64::from(pixel) << 8 | u64::from(index);
+        let is_border = (24..40).contains(&(pixel % 64));
+        let object_id = u32::from(!is_border || hash_words(key, half.index() as u64) >> 63 == 0);
+        let first_hit = FirstHit { object_id, ..FirstHit::WALL };
+        PathSample { radiance: Vec3::ZERO, first_hit, rays: 1 }
+    });
     let opaque = judge(&film, &settings(), 1.0).expect("judges");
     assert_eq!(opaque.predicted.quantile(1.0), 0.0);
     for denoiser in [None, Some(Denoiser::Builtin)] {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::adaptive::statistics::{SampleStatistics, scene_units};
 use crate::film::BlockSum;
-use crate::integrator::{FirstHit, PathSample};
+use crate::integrator::PathSample;
 use crate::sampler::hash_words;
 use glam::Vec3;
 
@@ -24,9 +24,8 @@ fn mixing_two_counts_meets_the_need() {
 }
 
 fn constant_block(samples: u32) -> BlockSum {
-    let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
     let mut sum = BlockSum::default();
-    (0..samples).for_each(|_| sum.add(&PathSample { radiance: Vec3::ONE, first_hit, rays: 1 }));
+    (0..samples).for_each(|_| sum.add(&PathSample::of_wall(Vec3::ONE)));
     sum
 }
 
@@ -191,13 +190,12 @@ fn stopped_film(size: u32, draw: fn(f64, f64) -> f64, variance_of_mean: f64) -> 
 }
 
 fn drawn_block(block: BlockWork, draw: fn(f64, f64) -> f64) -> BlockSum {
-    let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
     let mut sum = BlockSum::default();
     let key = hash_words(u64::from(block.pixel) << 8 | u64::from(block.level), block.half.index() as u64);
     for index in block.first..block.first + block.samples {
         let random = |d: u64| ((hash_words(key, u64::from(index) * 2 + d) >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
         let radiance = Vec3::splat(draw(random(0), random(1)) as f32);
-        sum.add(&PathSample { radiance, first_hit, rays: 1 });
+        sum.add(&PathSample::of_wall(radiance));
     }
     sum
 }

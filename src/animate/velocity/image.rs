@@ -70,15 +70,14 @@ impl Image {
         let target = target_in(other.tracer.world().scene(), &self.seen)?;
         let search = Search { other, vertices: &self.path.vertices, target };
         let starts = [self.virtual_place.place(&other.camera), of_surface, Some(center)];
-        let missed = |place: Vec2| search.miss(place).map(|miss| (place, miss));
         let nearest = starts
             .into_iter()
             .flatten()
-            .filter_map(missed)
-            .min_by(|(_, a), (_, b)| a.length_squared().total_cmp(&b.length_squared()))?;
+            .filter_map(|place| search.aim(place))
+            .min_by(|a, b| a.miss.length_squared().total_cmp(&b.miss.length_squared()))?;
         let place = search.solve(nearest)?;
-        let most = NEAR_PX.max(2.0 * nearest.0.distance(center));
-        (place.distance(nearest.0) <= most).then_some(place)
+        let most = NEAR_PX.max(2.0 * nearest.place_px.distance(center));
+        (place.distance(nearest.place_px) <= most).then_some(place)
     }
 }
 
@@ -89,7 +88,19 @@ struct Search<'a> {
     target: Target,
 }
 
+/// A place in the other picture.
+#[derive(Clone, Copy)]
+struct Aim {
+    place_px: Vec2,
+    /// [`Search::miss`].
+    miss: Vec3A,
+}
+
 impl Search<'_> {
+    fn aim(&self, place_px: Vec2) -> Option<Aim> {
+        self.miss(place_px).map(|miss| Aim { place_px, miss })
+    }
+
     /// By how much the last ray from a place misses the target, as a difference of unit directions; `None` where there is no such
     /// ray, or the target is behind it.
     fn miss(&self, place: Vec2) -> Option<Vec3A> {
@@ -102,24 +113,24 @@ impl Search<'_> {
     }
 
     /// Gauss and Newton's method with a derivative by differences at every step; `None` where it does not come to rest.
-    fn solve(&self, (mut place, mut miss): (Vec2, Vec3A)) -> Option<Vec2> {
+    fn solve(&self, mut aim: Aim) -> Option<Vec2> {
         const MOST_STEPS: usize = 12;
         const AT_REST_PX: f32 = 0.005;
         for _ in 0..MOST_STEPS {
-            let step = self.step(place, miss)?;
-            let (next, next_miss) = self.shortened(place, miss, step)?;
-            let moved = next.distance(place);
-            (place, miss) = (next, next_miss);
+            let step = self.step(aim)?;
+            let next = self.shortened(aim, step)?;
+            let moved = next.place_px.distance(aim.place_px);
+            aim = next;
             if moved < AT_REST_PX && step.length() < 2.0 * AT_REST_PX {
-                return Some(place);
+                return Some(aim.place_px);
             }
         }
         None
     }
 
     /// To where the miss would be least, if it were linear.
-    fn step(&self, place: Vec2, miss: Vec3A) -> Option<Vec2> {
-        let [by_x, by_y] = [Vec2::X, Vec2::Y].map(|axis| self.derivative(place, miss, axis));
+    fn step(&self, aim: Aim) -> Option<Vec2> {
+        let [by_x, by_y] = [Vec2::X, Vec2::Y].map(|axis| self.derivative(aim, axis));
         let (by_x, by_y) = (by_x?, by_y?);
         let (xx, xy, yy) = (by_x.dot(by_x), by_x.dot(by_y), by_y.dot(by_y));
         let determinant = xx * yy - xy * xy;
@@ -127,25 +138,25 @@ impl Search<'_> {
         if determinant <= 1e-6 * (0.5 * (xx + yy)).powi(2) {
             return None;
         }
-        let (x, y) = (by_x.dot(miss), by_y.dot(miss));
+        let (x, y) = (by_x.dot(aim.miss), by_y.dot(aim.miss));
         Some(Vec2::new(xy * y - yy * x, xy * x - xx * y) / determinant)
     }
 
     /// Of the miss, a pixel along an axis, from whichever side has a ray.
-    fn derivative(&self, place: Vec2, miss: Vec3A, axis: Vec2) -> Option<Vec3A> {
+    fn derivative(&self, aim: Aim, axis: Vec2) -> Option<Vec3A> {
         const STEP_PX: f32 = 0.25;
-        [STEP_PX, -STEP_PX].into_iter().find_map(|step| Some((self.miss(place + step * axis)? - miss) / step))
+        let by = |step: f32| Some((self.miss(aim.place_px + step * axis)? - aim.miss) / step);
+        [STEP_PX, -STEP_PX].into_iter().find_map(by)
     }
 
     /// The step, or the part of it after which the target is missed by less.
-    fn shortened(&self, place: Vec2, miss: Vec3A, step: Vec2) -> Option<(Vec2, Vec3A)> {
+    fn shortened(&self, aim: Aim, step: Vec2) -> Option<Aim> {
         const MOST_HALVINGS: i32 = 5;
         // Where it is missed by rounding alone, no step makes it less.
         const ROUNDING: f32 = 1e-6;
         (0..=MOST_HALVINGS).find_map(|halving| {
-            let next = place + step * 0.5_f32.powi(halving);
-            let next_miss = self.miss(next)?;
-            (next_miss.length() <= miss.length().max(ROUNDING)).then_some((next, next_miss))
+            let next = self.aim(aim.place_px + step * 0.5_f32.powi(halving))?;
+            (next.miss.length() <= aim.miss.length().max(ROUNDING)).then_some(next)
         })
     }
 }

@@ -1,10 +1,12 @@
 //! How the tables of a coat over a metal are made: a lobe of one reflection, scaled until it brings out what the walk does.
 
 use super::{COLUMNS, Cell, LayerPoint, SMALLEST_AVERAGE, cosine, inside, outside, place, seen_through};
-use crate::bsdf::albedo_table::{direction_at, visible_normals_and_weights};
+use crate::bsdf::albedo_table::{TablePlace, direction_at, visible_normals_and_weights};
 use crate::bsdf::anisotropic_table::{AZIMUTHS, Azimuths};
 use crate::bsdf::coat::Coat;
-use crate::bsdf::layer_walk::{Entering, LeavingByReflections, Metal, Nodes, Underside, directions, follow};
+use crate::bsdf::layer_walk::{
+    Entering, LeavingByReflections, Metal, Nodes, OverAzimuths, Underside, directions, follow,
+};
 use crate::bsdf::microfacets::Microfacets;
 use glam::Vec3;
 use std::f32::consts::FRAC_PI_2;
@@ -40,7 +42,7 @@ impl<'a> CoatOver<'a> {
         let leaving = follow(metal, &self.underside);
         let seen = seen_through(base, &self.coat);
         let mut points = self.scaled_lobe(seen.as_ref(), &leaving);
-        if let Some(seen) = seen.filter(|seen| !self.is_isotropic(seen)) {
+        if let Some(seen) = seen.filter(|seen| self.over_azimuths(seen) == OverAzimuths::Varying) {
             return self.by_azimuth(&seen, &points, &leaving);
         }
         for (point, entering) in points.iter_mut().zip(&self.entering) {
@@ -58,9 +60,8 @@ impl<'a> CoatOver<'a> {
         }
     }
 
-    /// Whether all azimuths are alike.
-    fn is_isotropic(&self, seen: &Microfacets) -> bool {
-        seen.is_isotropic() && self.coat.facets.is_none_or(|facets| facets.is_isotropic())
+    fn over_azimuths(&self, seen: &Microfacets) -> OverAzimuths {
+        OverAzimuths::of(self.coat.facets.iter().chain([seen]))
     }
 
     /// The table of anisotropic facets, whose lobe is scaled as `points` say.
@@ -101,9 +102,9 @@ impl<'a> CoatOver<'a> {
             }
             return points;
         };
-        let is_isotropic = self.is_isotropic(seen);
+        let over_azimuths = self.over_azimuths(seen);
         let lobe: [Vec<Reflected>; COLUMNS] = std::array::from_fn(|column| {
-            directions(cosine(column), is_isotropic)
+            directions(cosine(column), over_azimuths)
                 .flat_map(|(share, wo)| reflected_once(seen, &self.coat, wo, share))
                 .collect()
         });
@@ -135,8 +136,7 @@ fn reflected_once<'a>(
         let light = 2.0 * view.dot(m) * m - view;
         let wi = outside(light, coat.eta).filter(|_| light.z > 0.0)?;
         let share = entered * weight * seen.unshadowed(view, light) * coat.passed(wi);
-        let (column, fraction) = place(wi.z);
-        Some(Reflected { share, column, fraction })
+        Some(Reflected { share, column: place(wi.z) })
     };
     visible_normals_and_weights(seen, view).filter_map(reflected)
 }
@@ -179,15 +179,15 @@ impl Cell {
 struct Reflected {
     share: f32,
     /// Where that direction lies between columns.
-    column: usize,
-    fraction: f32,
+    column: TablePlace,
 }
 
 /// Share of what has entered that the scaled lobe brings out.
 fn leaving_by_lobe(lobe: &[Reflected], points: &[LayerPoint; COLUMNS], brought_out: f32) -> f32 {
     let scaled = |to: &Reflected| {
-        let (low, high) = (points[to.column].brought_out, points[to.column + 1].brought_out);
-        to.share * ((low + (high - low) * to.fraction) * brought_out).sqrt()
+        let TablePlace { node, fraction } = to.column;
+        let (low, high) = (points[node].brought_out, points[node + 1].brought_out);
+        to.share * ((low + (high - low) * fraction) * brought_out).sqrt()
     };
     lobe.iter().map(scaled).sum()
 }
@@ -195,14 +195,14 @@ fn leaving_by_lobe(lobe: &[Reflected], points: &[LayerPoint; COLUMNS], brought_o
 /// See [`CoatOver::column_weights`]; by the midpoint rule in √μ.
 fn column_weights(coat: &Coat<'_>) -> [f32; COLUMNS] {
     const STEPS: usize = 512;
-    let is_isotropic = coat.facets.is_none_or(|facets| facets.is_isotropic());
+    let over_azimuths = OverAzimuths::of(&coat.facets);
     let mut weights = [0.0; COLUMNS];
     for step in 0..STEPS {
         let root = (step as f32 + 0.5) / STEPS as f32;
         let mu = root * root;
-        let passed: f32 = directions(mu, is_isotropic).map(|(share, w)| share * coat.passed(w)).sum();
+        let passed: f32 = directions(mu, over_azimuths).map(|(share, w)| share * coat.passed(w)).sum();
         let weight = 4.0 * root * mu * passed / STEPS as f32;
-        let (column, fraction) = place(mu);
+        let TablePlace { node: column, fraction } = place(mu);
         weights[column] += weight * (1.0 - fraction);
         weights[column + 1] += weight * fraction;
     }

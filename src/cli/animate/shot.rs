@@ -110,7 +110,7 @@ impl<'a> Shot<'a> {
     /// Makes the folder of the frames, once all that can be refused has been, and checks that they can be written.
     fn make_folder(&self) -> Result<()> {
         let first_file = self.name.of(self.arguments.frames.first);
-        if let Some(folder) = folder_of(&first_file) {
+        if let Some(folder) = named_folder(&first_file) {
             std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
         }
         output::check_target(&first_file)?;
@@ -158,8 +158,8 @@ impl<'a> Shot<'a> {
     pub(in crate::cli) fn check_video(&self) -> Result<()> {
         if let Some((path, _)) = self.arguments.video()? {
             // The frames' own folder is not there yet.
-            let is_beside_frames = folder_of(path) == folder_of(&self.name.of(self.settings.first));
-            if !is_beside_frames || folder_of(path).is_none_or(Path::exists) {
+            let is_beside_frames = named_folder(path) == named_folder(&self.name.of(self.settings.first));
+            if !is_beside_frames || named_folder(path).is_none_or(Path::exists) {
                 output::check_writable(path)?;
             }
         }
@@ -304,7 +304,7 @@ fn remove_leftovers_of_frame(picture: &Path) {
 }
 
 /// A file's folder, where its name has one.
-fn folder_of(file: &Path) -> Option<&Path> {
+fn named_folder(file: &Path) -> Option<&Path> {
     file.parent().filter(|folder| !folder.as_os_str().is_empty())
 }
 

@@ -1,7 +1,7 @@
 //! `farm merge`: what is there into films, and what comes next.
 
 use super::job::Job;
-use super::unit::{Bench, KeepingArguments};
+use super::unit::{KeepingArguments, Worker};
 use super::{CALL_AGAIN, Threads, frame_lock};
 use crate::cli::words::{count, listed, samples_in_words};
 use anyhow::{Context, Result, bail};
@@ -42,8 +42,8 @@ pub(super) enum MergeWent {
 
 /// Merges all frames that can be merged.
 pub(super) fn run(arguments: &MergeArguments) -> Result<ExitCode> {
-    Bench::with(&arguments.folder, &arguments.keeping, &arguments.threads, |bench| {
-        let Bench { farm, job, signals, .. } = bench;
+    Worker::with(&arguments.folder, &arguments.keeping, &arguments.threads, |worker| {
+        let Worker { farm, job, signals, .. } = worker;
         let mut waits = false;
         for frame_index in chosen(farm, &arguments.frames)? {
             if signals.leaves() {
@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<ExitCode> {
             let path = frame_lock(farm, frame_index)?;
             let lock = wait_for_lock(&path, &|| signals.leaves()).with_context(|| path.display().to_string())?;
             let Some(lock) = lock else { return Ok(ExitCode::from(CALL_AGAIN)) };
-            match merge(&bench, frame_index, &lock)? {
+            match merge(&worker, frame_index, &lock)? {
                 MergeWent::On => {}
                 MergeWent::Waits => waits = true,
                 MergeWent::Left => return Ok(ExitCode::from(CALL_AGAIN)),
@@ -85,8 +85,8 @@ fn say_missing(farm: &Farm, frame_index: usize, missing: &[u64]) {
 }
 
 /// Merges a frame whose lock is held.
-pub(super) fn merge(bench: &Bench<'_>, frame_index: usize, lock: &Lock) -> Result<MergeWent> {
-    let Bench { farm, job, signals, every, .. } = *bench;
+pub(super) fn merge(worker: &Worker<'_>, frame_index: usize, lock: &Lock) -> Result<MergeWent> {
+    let Worker { farm, job, signals, every, .. } = *worker;
     if progress(farm, frame_index) == Progress::Done {
         return Ok(MergeWent::On);
     }

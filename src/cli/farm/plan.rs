@@ -74,9 +74,8 @@ impl Drop for Unfinished {
     }
 }
 
-/// Plans; a folder that has a manifest is left alone.
-pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
-    let folder = &arguments.output;
+/// Refuses a folder in which a farm is, or was.
+fn check_is_free(folder: &Path) -> Result<()> {
     if Farm::manifest_file(folder).exists() {
         bail!("{} is a farm already: go on with it, name another folder, or remove it", folder.display());
     }
@@ -86,6 +85,11 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
             remains.display()
         );
     }
+    Ok(())
+}
+
+/// Where a farm is planned, as its manifest can hold it.
+fn own_directory() -> Result<PathBuf> {
     let directory = std::env::current_dir().context("where the farm is planned")?;
     if directory.to_str().is_none() {
         bail!(
@@ -93,19 +97,37 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
             directory.display()
         );
     }
-    let mut words = vec![arguments.scene.clone()];
-    let work = match &arguments.frames {
-        None => Work::Render,
-        Some(frames) => {
-            words.extend(["--frames".to_owned(), frames.clone()]);
-            Work::Animate
+    Ok(directory)
+}
+
+impl PlanArguments {
+    /// What is rendered, and the words of `render` or `animate` that ask for it.
+    fn work(&self) -> (Work, Vec<String>) {
+        let scene = [self.scene.clone()].into_iter();
+        let options = self.options.iter().cloned();
+        match &self.frames {
+            None => (Work::Render, scene.chain(options).collect()),
+            Some(frames) => {
+                (Work::Animate, scene.chain(["--frames".to_owned(), frames.clone()]).chain(options).collect())
+            }
         }
-    };
-    words.extend(arguments.options.iter().cloned());
-    let format = match arguments.format {
-        Format::Exr => PictureFormat::Exr,
-        Format::Png => PictureFormat::Png,
-    };
+    }
+
+    fn picture_format(&self) -> PictureFormat {
+        match self.format {
+            Format::Exr => PictureFormat::Exr,
+            Format::Png => PictureFormat::Png,
+        }
+    }
+}
+
+/// Plans; a folder that has a manifest is left alone.
+pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
+    let folder = &arguments.output;
+    check_is_free(folder)?;
+    let directory = own_directory()?;
+    let (work, words) = arguments.work();
+    let format = arguments.picture_format();
     JobOptions::parse(work, &words, folder, format).context("farm plan, after --")?;
     JobOptions::check_are_for_all(work, &words)?;
     let unfinished = Unfinished::make(&folder.join("pictures"))?;

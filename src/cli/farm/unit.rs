@@ -72,7 +72,7 @@ enum Standing {
 }
 
 /// Renders units of one farm, and keeps the last scene that it loaded.
-pub(super) struct Bench<'a> {
+pub(super) struct Worker<'a> {
     pub(super) farm: &'a Farm,
     pub(super) job: &'a Job<'a>,
     pub(super) signals: &'a Signals,
@@ -82,9 +82,9 @@ pub(super) struct Bench<'a> {
 
 /// Renders what was asked for.
 pub(super) fn run(arguments: &UnitArguments) -> Result<ExitCode> {
-    Bench::with(&arguments.folder, &arguments.keeping, &arguments.threads, |mut bench| {
+    Worker::with(&arguments.folder, &arguments.keeping, &arguments.threads, |mut worker| {
         for &unit in &arguments.units {
-            match bench.render(unit, IfBusy::Wait)? {
+            match worker.render(unit, IfBusy::Wait)? {
                 Went::Rendered | Went::WasThere => {}
                 Went::Left | Went::Busy => return Ok(ExitCode::from(CALL_AGAIN)),
                 Went::HasNoOrder => bail!("unit {unit} has no order: fechner farm merge writes it again"),
@@ -100,13 +100,13 @@ fn plans_of_finished(farm: &Farm, frame_index: usize) -> Option<u32> {
     figures["plans"].as_u64()?.try_into().ok()
 }
 
-impl<'a> Bench<'a> {
+impl<'a> Worker<'a> {
     /// Does work of the farm in a folder, in a pool of so many threads.
     pub(super) fn with(
         folder: &Path,
         keeping: &KeepingArguments,
         threads: &Threads,
-        work: impl FnOnce(Bench<'_>) -> Result<ExitCode> + Send,
+        work: impl FnOnce(Worker<'_>) -> Result<ExitCode> + Send,
     ) -> Result<ExitCode> {
         let farm = open_for_work(folder)?;
         let signals = Signals::listen()?;
@@ -114,7 +114,7 @@ impl<'a> Bench<'a> {
         threads.pool()?.install(|| {
             let options = JobOptions::of(&farm)?;
             let job = options.job()?;
-            work(Bench { farm: &farm, job: &job, signals: &signals, every, loaded: None })
+            work(Worker { farm: &farm, job: &job, signals: &signals, every, loaded: None })
         })
     }
 

@@ -1,7 +1,7 @@
 //! `farm work`: one of any number of processes on a folder.
 
 use super::merge::{MergeWent, conclude, merge};
-use super::unit::{Bench, IfBusy, KeepingArguments, Went};
+use super::unit::{IfBusy, KeepingArguments, Went, Worker};
 use super::{CALL_AGAIN, Threads, frame_lock};
 use anyhow::{Context, Result};
 use clap::Args;
@@ -27,8 +27,8 @@ const PAUSE: Duration = Duration::from_millis(200);
 
 /// Works until all frames are done. Where others merge or render, it takes what they leave.
 pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
-    Bench::with(&arguments.folder, &arguments.keeping, &arguments.threads, |mut bench| {
-        let Bench { farm, job, signals, .. } = bench;
+    Worker::with(&arguments.folder, &arguments.keeping, &arguments.threads, |mut worker| {
+        let Worker { farm, job, signals, .. } = worker;
         loop {
             let (mut all_done, mut did_something) = (true, false);
             for frame_index in 0..farm.manifest().frames.len() {
@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
                     Progress::ToMerge { .. } => {
                         let path = frame_lock(farm, frame_index)?;
                         if let Some(lock) = try_lock(&path).with_context(|| path.display().to_string())? {
-                            match merge(&bench, frame_index, &lock)? {
+                            match merge(&worker, frame_index, &lock)? {
                                 MergeWent::On => did_something = true,
                                 MergeWent::Waits => {}
                                 MergeWent::Left => return Ok(ExitCode::from(CALL_AGAIN)),
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
                     }
                     Progress::Open { missing, .. } => {
                         for unit in missing {
-                            match bench.render(unit, IfBusy::Skip)? {
+                            match worker.render(unit, IfBusy::Skip)? {
                                 Went::Rendered => did_something = true,
                                 Went::Left => return Ok(ExitCode::from(CALL_AGAIN)),
                                 Went::WasThere | Went::Busy | Went::HasNoOrder => {}

@@ -39,6 +39,14 @@ impl Placement {
         let cofactors = Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
         Self { normal_matrix: cofactors * flip, flip, ..self }
     }
+
+    /// A shading normal in the world, of the mean of the corners' normals in the mesh. A file may wind its triangles against its normals; the
+    /// geometric side is what counts.
+    #[inline(always)]
+    fn blended_normal(&self, of_corners: Vec3, geometric_normal: Vec3) -> Vec3 {
+        let n = Vec3::from(self.normal_matrix * Vec3A::from(of_corners)).normalize_or(geometric_normal);
+        if n.dot(geometric_normal) < 0.0 { -n } else { n }
+    }
 }
 
 impl World {
@@ -140,7 +148,7 @@ impl World {
         let normal_a = ((ray.origin + ray.direction * hit.distance) - place.center).normalize_or(Vec3A::Y);
         let normal = Vec3::from(normal_a);
         let position = Vec3::from(place.center) + place.radius * normal;
-        let needs_tangent = self.scene.materials[self.material_of(hit.object).0 as usize].needs_tangent();
+        let needs_tangent = self.material(hit.object).needs_tangent();
         // −1 where the sphere is mirrored.
         let flip = place.axes.determinant().signum();
         let along_u = || flip * place.axes.y_axis.cross(normal_a).normalize_or(place.axes.x_axis);
@@ -184,10 +192,7 @@ impl World {
             geometric_normal
         } else {
             let [n0, n1, n2] = indices().map(|i| mesh.normals[i]);
-            let blended = Vec3A::from(n0 * b0 + n1 * b1 + n2 * b2);
-            let n = Vec3::from(placement.normal_matrix * blended).normalize_or(geometric_normal);
-            // A file may wind its triangles against its normals; the geometric side is what counts.
-            if n.dot(geometric_normal) < 0.0 { -n } else { n }
+            placement.blended_normal(n0 * b0 + n1 * b1 + n2 * b2, geometric_normal)
         };
         let (tangent, handedness) = if !placement.needs_tangent {
             (None, 1.0)

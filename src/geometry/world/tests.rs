@@ -1,7 +1,7 @@
 //! Two levels against one, and mirrored instances.
 
 use super::*;
-use crate::scene::{ColorInput, Material, Mesh, MeshId, Sphere, Surface};
+use crate::scene::{ColorInput, Instance, Material, Mesh, MeshId, Sphere, Surface};
 use glam::{Quat, vec3a};
 
 /// A tetrahedron placed by each of the transforms, and a sphere.

@@ -63,7 +63,7 @@ impl Session<'_> {
 
     /// Distance of the scene's middle, along the axis where that is before the camera; none from within it.
     fn depth_of_scene(&self) -> Option<f32> {
-        let (center, _) = self.tracer.world().bounding_sphere();
+        let center = self.tracer.world().bounding_sphere().center;
         let way = center - self.held.camera.position;
         let along_axis = way.dot(self.held.camera.axes().forward);
         let distance = if along_axis > 0.0 { along_axis } else { way.length() };

@@ -13,6 +13,7 @@ use crate::preview::command::Status;
 use crate::preview::glimpse::Glimpse;
 use crate::preview::screen::{Looked, Scenery, Screen};
 use crate::preview::shared::Shared;
+use crate::preview::spectator::Stage;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -68,7 +69,7 @@ impl Watch<'_> {
     fn show(&self, moving: &mut Moving<'_>, state: &RenderState) {
         let tone = state.tone.as_ref();
         *moving.glimpse = None;
-        let scenery = Scenery { film: &state.film, tone, settings: self.settings, is_at_rest: false, step: 1 };
+        let scenery = Scenery { film: &state.film, tone, settings: self.settings, stage: Stage::UnderWay, step: 1 };
         moving.screen.show(scenery, self.shared);
         moving.status.note = moving.status.note.take().filter(|_| moving.begun.elapsed() < NOTE_TIME);
         moving.samples_since = 0;

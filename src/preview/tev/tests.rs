@@ -98,7 +98,7 @@ fn tev_receives_the_picture_and_its_layers() {
     let film = film();
     let rgb_cd_m2: Vec<[f32; 3]> = (0..35).map(|pixel| [pixel as f32, 2.0, -3.0]).collect();
     let shown =
-        Shown { film: &film, rgb_cd_m2: &rgb_cd_m2, step: 1, looked: None, nits_per_unit: 2.0, is_at_rest: true };
+        Shown { film: &film, rgb_cd_m2: &rgb_cd_m2, step: 1, looked: None, nits_per_unit: 2.0, stage: Stage::AtRest };
     let mut sender = Tev::new(vec![address], "scene".to_owned(), |warning| panic!("{warning}")).expect("a thread");
     sender.offer(&Shown { step: 2, ..shown });
     sender.offer(&shown);
@@ -122,7 +122,7 @@ fn a_tev_that_is_not_there_is_told_once() {
     let film = film();
     let rgb_cd_m2 = vec![[1.0; 3]; 35];
     let shown =
-        Shown { film: &film, rgb_cd_m2: &rgb_cd_m2, step: 1, looked: None, nits_per_unit: 1.0, is_at_rest: true };
+        Shown { film: &film, rgb_cd_m2: &rgb_cd_m2, step: 1, looked: None, nits_per_unit: 1.0, stage: Stage::AtRest };
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("an address");
     let mut sender = Tev::new(vec![address], "scene".to_owned(), count).expect("a thread");

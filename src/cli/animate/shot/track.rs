@@ -1,6 +1,6 @@
 //! What is known of all frames of a shot before any is rendered: their light, and what each needs.
 
-use super::{Shot, folder_of};
+use super::{Shot, named_folder};
 use crate::cli::animate::record::read_json;
 use crate::cli::console::{Counter, duration_in_words};
 use crate::cli::words::count;
@@ -30,7 +30,7 @@ impl Shot<'_> {
             say!("{}: of other settings or another scene, made anew", file.display());
         }
         self.check_ends()?;
-        if folder_of(&self.file(self.settings.first)).is_none_or(Path::exists) {
+        if named_folder(&self.file(self.settings.first)).is_none_or(Path::exists) {
             self.make_folder()?;
         }
         let frames = (self.settings.last - self.settings.first + 1) as usize;

@@ -11,6 +11,7 @@ mod document;
 mod extension;
 mod material;
 mod motion;
+mod textures;
 
 use self::buffers::Buffers;
 use self::material::Materials;

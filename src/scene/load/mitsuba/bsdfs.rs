@@ -1,9 +1,9 @@
 //! `<bsdf>` and its wrappers.
 
 use super::super::error::{LoadError, names_of};
+use super::colors::{Meaning, number_of};
 use super::element::Element;
 use super::surfaces::PLAIN;
-use super::textures::{Meaning, number_of};
 use super::{Reader, blend};
 use crate::scene::{Alpha, ColorInput, HeightMap, HeightUnit, Material, Relief, ScalarInput, Surface};
 use glam::Vec3;

@@ -51,7 +51,7 @@ impl Given {
     /// Where a file may be that is named in one of `files`: in the folders of `<path>`, or beside those, in this order.
     fn candidates(&self, name: &str, files: &[&Path]) -> Vec<PathBuf> {
         let name = name.replace('\\', "/");
-        let beside = files.iter().map(|file| folder_of(file));
+        let beside = files.iter().map(|file| parent_or_empty(file));
         let mut candidates: Vec<PathBuf> = Vec::new();
         for candidate in self.folders.iter().map(PathBuf::as_path).chain(beside).map(|folder| folder.join(&name)) {
             if !candidates.contains(&candidate) {
@@ -76,7 +76,8 @@ impl Given {
     }
 }
 
-fn folder_of(file: &Path) -> &Path {
+/// What a name beside a file is joined to: messages show it as the file is named.
+fn parent_or_empty(file: &Path) -> &Path {
     file.parent().unwrap_or(Path::new(""))
 }
 
@@ -139,7 +140,7 @@ impl TreeBuilder<'_> {
                     }
                 }
                 "path" => {
-                    let folder = folder_of(&self.file).join(converted.require("value")?.replace('\\', "/"));
+                    let folder = parent_or_empty(&self.file).join(converted.require("value")?.replace('\\', "/"));
                     self.given.folders.insert(0, folder);
                 }
                 "include" => {

@@ -4,8 +4,8 @@ use super::super::environment;
 use super::super::error::{LoadError, names_of};
 use super::super::sky::{self, Sky};
 use super::Reader;
+use super::colors::Meaning;
 use super::element::Element;
-use super::textures::Meaning;
 use super::transform;
 use crate::scene::{ColorInput, Environment, Light, Parametrisation, SpotFalloff};
 use glam::{Affine3A, Mat3, Vec3};
@@ -98,25 +98,27 @@ impl Reader {
         Ok(())
     }
 
+    /// The sun's direction in our model's space.
+    fn towards_sun(&mut self, emitter: &Element, from_world: Mat3) -> Result<Vec3, LoadError> {
+        let Some(direction) = emitter.vector("sundirection")? else {
+            self.builder.note(format!(
+                "{}: a sun's place is not computed from date and place: it stands 45° high.",
+                emitter.place()
+            ));
+            return Ok(Vec3::new(0.0, 1.0, -1.0).normalize());
+        };
+        // In the world's space, whatever the emitter's transform (Mitsuba 0.6, `sunsky.cpp`; 3, `sunsky.h`).
+        let direction = direction.try_normalize().ok_or_else(|| emitter.error("a sun's direction of no length"))?;
+        Ok(from_world * direction)
+    }
+
     /// Sky, sun or both, by our own model of a clear day in cd/m² ([`sky`]).
     fn sky(&mut self, emitter: &Element, to_world: &Affine3A) -> Result<(), LoadError> {
         let kind = emitter.kind();
         // Version 3 has its zenith along +z, the dialects before it along +y; our model's is +y.
         let to_model = if self.since_2 { Mat3::from_rotation_x(-FRAC_PI_2) } else { Mat3::IDENTITY };
         let from_world = to_model * environment::rotation_of(to_world).transpose();
-        let towards_sun = match emitter.vector("sundirection")? {
-            // In the world's space, whatever the emitter's transform (Mitsuba 0.6, `sunsky.cpp`; 3, `sunsky.h`).
-            Some(direction) => {
-                from_world * direction.try_normalize().ok_or_else(|| emitter.error("a sun's direction of no length"))?
-            }
-            None => {
-                self.builder.note(format!(
-                    "{}: a sun's place is not computed from date and place: it stands 45° high.",
-                    emitter.place()
-                ));
-                Vec3::new(0.0, 1.0, -1.0).normalize()
-            }
-        };
+        let towards_sun = self.towards_sun(emitter, from_world)?;
         emitter.ignore(&["year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone"]);
         emitter.ignore(&["resolution", "sunaperture", "complexsun", "stretch", "extend", "sunradiusscale"]);
         let elevation = towards_sun.y.clamp(-1.0, 1.0).asin().to_degrees();

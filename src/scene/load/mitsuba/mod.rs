@@ -5,6 +5,7 @@
 
 mod blend;
 mod bsdfs;
+mod colors;
 mod element;
 mod emitters;
 mod primitives;
@@ -258,7 +259,7 @@ impl Reader {
 
     /// Puts the absorption of a medium behind a surface.
     fn fill(&mut self, material: &mut Material, medium: &Element) -> Result<(), LoadError> {
-        use textures::Meaning::Coefficient;
+        use colors::Meaning::Coefficient;
         if medium.kind() != "homogeneous" {
             return Err(medium.unsupported("only homogeneous media behind glass are rendered, by their absorption"));
         }

@@ -59,25 +59,32 @@ fn parse(bytes: &[u8], version: u16) -> Option<Mesh> {
         cursor.take(1)?;
     }
     let (vertices, triangles) = (cursor.count()?, cursor.count()?);
-    let double = flags & DOUBLE_PRECISION != 0;
+    let precision = if flags & DOUBLE_PRECISION != 0 { Precision::Double } else { Precision::Single };
     mesh.positions =
-        cursor.floats(vertices, 3, double)?.as_chunks::<3>().0.iter().map(|&p| Vec3::from_array(p)).collect();
+        cursor.floats(vertices, 3, precision)?.as_chunks::<3>().0.iter().map(|&p| Vec3::from_array(p)).collect();
     if flags & HAS_NORMALS != 0 {
         mesh.normals =
-            cursor.floats(vertices, 3, double)?.as_chunks::<3>().0.iter().map(|&n| Vec3::from_array(n)).collect();
+            cursor.floats(vertices, 3, precision)?.as_chunks::<3>().0.iter().map(|&n| Vec3::from_array(n)).collect();
     }
     if flags & HAS_TEXTURE_COORDINATES != 0 {
-        let coordinates = cursor.floats(vertices, 2, double)?;
+        let coordinates = cursor.floats(vertices, 2, precision)?;
         mesh.uvs = coordinates.as_chunks::<2>().0.iter().map(|&uv| Vec2::from_array(uv)).collect();
     }
     if flags & HAS_COLORS != 0 {
-        cursor.floats(vertices, 3, double)?;
+        cursor.floats(vertices, 3, precision)?;
     }
     let indices = cursor.take(triangles.checked_mul(12)?)?;
     let word = |b: &[u8; 4]| u32::from_le_bytes(*b);
     mesh.triangles =
         indices.as_chunks::<4>().0.as_chunks::<3>().0.iter().map(|[a, b, c]| [word(a), word(b), word(c)]).collect();
     mesh.triangles.iter().flatten().all(|&index| (index as usize) < vertices).then_some(mesh)
+}
+
+/// Of a mesh's numbers.
+#[derive(Clone, Copy, Debug)]
+enum Precision {
+    Single,
+    Double,
 }
 
 struct Cursor<'a> {
@@ -96,14 +103,18 @@ impl<'a> Cursor<'a> {
         usize::try_from(bytes.iter().rev().fold(0_u64, |count, &byte| count << 8 | u64::from(byte))).ok()
     }
 
-    fn floats(&mut self, count: usize, each: usize, double: bool) -> Option<Vec<f32>> {
+    fn floats(&mut self, count: usize, each: usize, precision: Precision) -> Option<Vec<f32>> {
         let numbers = count.checked_mul(each)?;
-        if double {
-            let bytes = self.take(numbers.checked_mul(8)?)?;
-            return Some(bytes.as_chunks::<8>().0.iter().map(|&eight| f64::from_le_bytes(eight) as f32).collect());
-        }
-        let bytes = self.take(numbers.checked_mul(4)?)?;
-        Some(bytes.as_chunks::<4>().0.iter().map(|&four| f32::from_le_bytes(four)).collect())
+        Some(match precision {
+            Precision::Single => {
+                let bytes = self.take(numbers.checked_mul(4)?)?;
+                bytes.as_chunks::<4>().0.iter().map(|&four| f32::from_le_bytes(four)).collect()
+            }
+            Precision::Double => {
+                let bytes = self.take(numbers.checked_mul(8)?)?;
+                bytes.as_chunks::<8>().0.iter().map(|&eight| f64::from_le_bytes(eight) as f32).collect()
+            }
+        })
     }
 }
 

@@ -4,9 +4,9 @@ use super::super::error::LoadError;
 use super::super::spectrum::named;
 use super::super::{luminance, share};
 use super::Reader;
+use super::colors::Meaning;
 use super::element::Element;
 use super::principled::Body;
-use super::textures::Meaning;
 use crate::scene::{ColorInput, Distribution, Roughness, RoughnessScale, ScalarInput, Surface, USUAL_IOR};
 use glam::Vec3;
 

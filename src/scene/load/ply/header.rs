@@ -1,7 +1,6 @@
 //! The header: which elements the body holds, in which encoding.
 
-use super::super::error::LoadError;
-use super::at_line;
+use super::super::error::{LoadError, Place};
 use std::path::Path;
 
 /// Longest header that is looked through.
@@ -95,7 +94,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header, LoadError> {
         number += 1;
         at += length + 1;
         let line = String::from_utf8_lossy(&rest[..length]);
-        let wrong = |problem: &str| LoadError::invalid_at(at_line(path, number), problem);
+        let wrong = |problem: &str| LoadError::invalid_at(Place::line(path, number), problem);
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
             ["format", name, ..] => {

@@ -8,7 +8,7 @@ mod body;
 mod header;
 mod strips;
 
-use super::error::{LoadError, Place};
+use super::error::LoadError;
 use super::{files, polygon};
 use crate::scene::Mesh;
 use body::Values;
@@ -174,11 +174,6 @@ fn read_faces<'h>(
         }
     }
     Ok(unused)
-}
-
-/// The place of an error in a PLY file: its header has lines, its body has none.
-fn at_line(path: &Path, line: usize) -> Place {
-    Place::line(path, line)
 }
 
 #[cfg(test)]
