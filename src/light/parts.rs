@@ -66,7 +66,7 @@ impl Lights {
     /// emission is a picture or that alpha covers: they may be black anywhere.
     pub fn parts_at(&self, world: &World, time: f32) -> impl Iterator<Item = LampPart> {
         let radiance_all_over = |object: u32| {
-            let material = &world.scene().materials[world.material_of(object).0 as usize];
+            let material = world.material(object);
             (material.emission.texture.is_none() && material.alpha == Alpha::Opaque).then_some(material.emission.factor)
         };
         self.emitters.iter().flat_map(move |emitter| {
