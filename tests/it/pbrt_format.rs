@@ -302,6 +302,19 @@ fn a_whole_disk_has_pbrts_coordinates() {
     assert!(mesh.uvs[up].abs_diff_eq(Vec2::new(0.25, 1.0), 1e-6), "{}", mesh.uvs[up]);
 }
 
+/// What a grid would have at a pole or in a disk's middle.
+#[test]
+fn curved_shapes_have_no_triangles_without_area() {
+    for shape in [
+        r#"Material "dielectric" ReverseOrientation Shape "sphere""#,
+        r#"Shape "sphere" "float zmax" 0.5"#,
+        r#"Shape "disk" "float phimax" 180"#,
+    ] {
+        let scene = scene("", shape);
+        assert!(!scene.notes.iter().any(|note| note.contains("without area")), "{shape}: {:?}", scene.notes);
+    }
+}
+
 #[test]
 fn triangles_without_coordinates_have_pbrts() {
     let texture = r#"Texture "q" "spectrum" "imagemap" "string filename" "grey.png" Material "diffuse" "texture reflectance" "q" "#;

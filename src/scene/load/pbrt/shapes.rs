@@ -194,7 +194,8 @@ fn full_turn(parameters: &Parameters) -> Result<f32, LoadError> {
     Ok(parameters.float_or("phimax", 360.0)?.clamp(0.0, 360.0).to_radians())
 }
 
-/// A surface over (u, v) in [0, 1]² from its points and normals; v runs up in pbrt's coordinates.
+/// A surface over (u, v) in [0, 1]² from its points and normals; v runs up in pbrt's coordinates. Where a row is one point, as at a pole,
+/// half of its triangles are not there.
 fn grid(surface: impl Fn(f32, f32) -> (Vec3, Vec3)) -> Mesh {
     let mut mesh = Mesh::default();
     for row in 0..=ALONG {
@@ -206,7 +207,8 @@ fn grid(surface: impl Fn(f32, f32) -> (Vec3, Vec3)) -> Mesh {
             mesh.uvs.push(Vec2::new(u, 1.0 - v));
         }
     }
-    mesh.triangles.extend(shapes::grid_triangles(0, [AROUND, ALONG]));
+    let triangles = shapes::grid_triangles(0, [AROUND, ALONG]);
+    mesh.triangles.extend(triangles.filter(|triangle| shapes::has_area(&mesh.positions, triangle)));
     mesh
 }
 
