@@ -75,6 +75,10 @@ fn what_is_not_rendered_is_told() {
         (r#"MakeNamedMedium "m" "rgb sigma_s" [0 0 0] "rgb Le" [5 5 5]"#, r#"medium "m": not used: "rgb Le"."#),
         (r#"LightSource "distant" "float power" 10"#, r#"light "distant": not used: "float power"."#),
         (
+            r#"Material "diffusetransmission" "rgb reflectance" [0.8 0.2 0.1] "rgb transmittance" [0.8 0.2 0.1]"#,
+            "make light together, [1.6, 0.4, 0.2]: both are scaled down to 1 in each such channel.",
+        ),
+        (
             r#"MakeNamedMedium "m" "rgb sigma_s" [0 0 0] MediumInterface "" "m" ReverseOrientation"#,
             "the medium outside of a reversed shape is not rendered.",
         ),
