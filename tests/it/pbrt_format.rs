@@ -16,7 +16,9 @@ fn folder() -> tempfile::TempDir {
     half.save(folder.path().join("grey.png")).unwrap();
     image::RgbImage::from_pixel(2, 2, image::Rgb([0, 255, 255])).save(folder.path().join("cyan.png")).unwrap();
     let leaf = image::RgbaImage::from_fn(4, 2, |x, _| image::Rgba([0, 255, 0, if x < 1 { 255 } else { 0 }]));
-    leaf.save(folder.path().join("leaf.png")).unwrap();
+    for name in ["leaf.png", "leaf.tga"] {
+        leaf.save(folder.path().join(name)).unwrap();
+    }
     folder
 }
 
@@ -233,6 +235,32 @@ fn a_number_of_a_picture_is_its_alpha_or_its_mean() {
     assert!(alpha("cyan.png").iter().all(|share| (share - 2.0 / 3.0).abs() < 1e-6), "{:?}", alpha("cyan.png"));
     let grey = srgb_to_linear(128.0 / 255.0);
     assert!(alpha("grey.png").iter().all(|share| (share - grey).abs() < 1e-4), "{:?}", alpha("grey.png"));
+}
+
+/// pbrt's `Image::Read` takes all but PNG and light for sRGB and drops their alpha.
+#[test]
+fn pictures_that_pbrt_leaves_to_stb_are_srgb_without_alpha() {
+    let folder = folder();
+    for name in ["grey.tga", "grey.bmp"] {
+        image::GrayImage::from_pixel(2, 2, image::Luma([128])).save(folder.path().join(name)).unwrap();
+    }
+    let alpha = |picture: &str| {
+        let texture = format!("Texture \"a\" \"float\" \"imagemap\" \"string filename\" {picture} ");
+        let world = format!("{texture} {SQUARE} \"texture alpha\" \"a\"");
+        let scene = try_load(folder.path(), "", &world).unwrap_or_else(|error| panic!("{error}"));
+        let (Alpha::Mask { value, .. } | Alpha::Blend { value }) = scene.materials[0].alpha else { panic!("no alpha") };
+        value.evaluate(&scene.textures, Vec2::new(0.625, 0.5))
+    };
+    let grey = srgb_to_linear(128.0 / 255.0);
+    for (picture, expected) in [
+        (r#""leaf.png""#, 0.0),
+        (r#""leaf.tga""#, 1.0 / 3.0),
+        (r#""grey.png" "string encoding" "linear""#, 128.0 / 255.0),
+        (r#""grey.tga" "string encoding" "linear""#, grey),
+        (r#""grey.bmp" "string encoding" "gamma 1.5""#, grey),
+    ] {
+        assert!((alpha(picture) - expected).abs() < 1e-4, "{picture}: {}, not {expected}", alpha(picture));
+    }
 }
 
 /// What has no place for a picture takes its mean; it took 1.
