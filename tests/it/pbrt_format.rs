@@ -84,6 +84,10 @@ fn what_is_not_rendered_is_told() {
             r#"MakeNamedMedium "m" "rgb sigma_s" [0 0 0] MediumInterface "" "m" ReverseOrientation"#,
             "the medium outside of a reversed shape is not rendered.",
         ),
+        (
+            r#"MakeNamedMedium "m" "rgb sigma_s" [0 0 0] MediumInterface "" "m" Scale -1 1 1 Shape "disk""#,
+            "the medium outside of a reversed shape is not rendered.",
+        ),
     ] {
         let scene = scene("", &format!("{directives} {SQUARE}"));
         assert!(scene.notes.iter().any(|note| note.ends_with(told)), "{directives}: {:?}", scene.notes);
@@ -332,6 +336,70 @@ fn a_whole_disk_has_pbrts_coordinates() {
     let up = mesh.positions.iter().position(|p| p.abs_diff_eq(Vec3::new(0.0, 2.0, 1.0), 1e-5)).unwrap();
     // A quarter turn, v = 0 at the rim; our v runs the other way.
     assert!(mesh.uvs[up].abs_diff_eq(Vec2::new(0.25, 1.0), 1e-6), "{}", mesh.uvs[up]);
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Facing {
+    AsMade,
+    TurnedOver,
+}
+
+/// Where the front of the only shape is, in its own coordinates: spheres, disks and cylinders are made to face outwards or up.
+fn facing(scene: &Scene) -> Facing {
+    let Some(instance) = scene.instances.first() else { return Facing::AsMade };
+    let mesh = &scene.meshes[instance.mesh.0 as usize];
+    let as_made = mesh.triangles.iter().filter(|triangle| {
+        let [a, b, c] = triangle.map(|index| mesh.positions[index as usize]);
+        (b - a).cross(c - a).dot(a + b + c) > 0.0
+    });
+    match as_made.count() {
+        0 => Facing::TurnedOver,
+        count if count == mesh.triangles.len() => Facing::AsMade,
+        count => panic!("{count} of {} triangles face outwards", mesh.triangles.len()),
+    }
+}
+
+/// pbrt's `Sphere`, `Disk` and `Cylinder::InteractionFromIntersection`; shapes that move have its `identity` for a transform.
+#[test]
+fn mirroring_turns_quadrics_over_and_no_mesh() {
+    use Facing::{AsMade, TurnedOver};
+    let glass = r#"Material "dielectric""#;
+    let light = r#"AreaLightSource "diffuse" "rgb L" [1 1 1]"#;
+    let mesh = r#"Shape "trianglemesh" "point3 P" [0 0 1 1 0 1 0 1 1]"#;
+    for (change, quadric, of_mesh) in [
+        ("", AsMade, AsMade),
+        ("Scale 2 1 1", AsMade, AsMade),
+        ("ReverseOrientation", TurnedOver, TurnedOver),
+        ("Scale -1 1 1", TurnedOver, AsMade),
+        ("ReverseOrientation Scale -1 1 1", AsMade, TurnedOver),
+        ("Scale -1 1 1 Scale 1 -1 1", AsMade, AsMade),
+        ("Scale -1 1 1 ActiveTransform EndTime Translate 1 0 0", AsMade, AsMade),
+    ] {
+        for kind in [
+            r#""sphere""#,
+            r#""sphere" "float zmax" 0.5"#,
+            r#""disk" "float height" 1"#,
+            r#""disk" "float height" 1 "float phimax" 90"#,
+            r#""cylinder""#,
+        ] {
+            for surface in [glass, light] {
+                assert_eq!(
+                    facing(&scene("", &format!("{surface} {change} Shape {kind}"))),
+                    quadric,
+                    "{change}, {kind}"
+                );
+            }
+        }
+        assert_eq!(facing(&scene("", &format!("{glass} {change} {mesh}"))), of_mesh, "{change}");
+    }
+    // A front that does not show leaves it analytic.
+    for (material, expected) in [(r#""diffuse""#, AsMade), (r#""diffuse" "string normalmap" "cyan.png""#, TurnedOver)] {
+        assert_eq!(
+            facing(&scene("", &format!("Scale -1 1 1 Material {material} Shape \"sphere\""))),
+            expected,
+            "{material}"
+        );
+    }
 }
 
 /// What a grid would have at a pole or in a disk's middle.
