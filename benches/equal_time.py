@@ -8,6 +8,7 @@ prints the table of `benches/results/sampling.md`. In an arm's time uniform samp
 `overhead`, the share of time outside of the tracer; where it ends with a look, as the arm does and as its report needs,
 times one less the share of the arm's last look. Its FLIP there is that of the arm `uniform-equal-time` by FLIP_POWER, its
 JOD by the line through that arm and `uniform` over the logarithm of samples, or by JOD_SLOPE where the two are too close.
+Where the arm's picture is that of `uniform`, both go from there: other counts of samples may lie less evenly.
 Bounds are of the seeds' scatter, one-sided, 95 %; an arm's overhead and last look are means over its seeds.
 """
 
@@ -44,11 +45,17 @@ def read(folder):
 
 def compare(ours, uniform, near, samples):
     """JOD less that of uniform sampling with so many samples, and FLIP over it."""
+    base = uniform if is_same_picture(ours, uniform) else near
     apart = math.log(near["spp"] / uniform["spp"])
     slope = (near["jod"] - uniform["jod"]) / apart if abs(apart) > LEAST_APART else JOD_SLOPE
-    jod = near["jod"] + slope * math.log(samples / near["spp"])
-    flip = near["flip_mean"] * (samples / near["spp"]) ** FLIP_POWER
+    jod = base["jod"] + slope * math.log(samples / base["spp"])
+    flip = base["flip_mean"] * (samples / base["spp"]) ** FLIP_POWER
     return ours["jod"] - jod, ours["flip_mean"] / flip
+
+
+def is_same_picture(one, other):
+    """Whether two renders have the same samples, by what pictures are measured by."""
+    return all(one[key] == other[key] for key in ("spp", "flip_mean", "jod"))
 
 
 def mean(values):

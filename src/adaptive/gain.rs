@@ -15,8 +15,9 @@ use fechner_perception::Plane;
 pub(super) const GROWTH: f64 = 0.5;
 /// Even counts are kept where the best ones would take more than this share of their samples.
 pub(super) const EVEN_ENOUGH: f64 = 0.95;
-/// The same of raw pictures on the way to a far rung: between the Cornell box (0.95 to 0.96), whose squared error is 0.90 of even
-/// counts', and the product shot (0.98), where even counts have 9.875 JOD at 96 samples and uneven ones 9.834 (`benches/results/sampling.md`).
+/// The same of raw pictures on the way to a far rung: between the Cornell box (0.95 to 0.96), whose squared error was 0.90 ± 0.03 of
+/// even counts' when this was chosen and is 1.04 ± 0.02 by present masks, and the product shot (0.98), where even counts have 9.875 JOD
+/// at 96 samples and uneven ones 9.834 (`benches/results/sampling.md`).
 const EVEN_ENOUGH_WHILE_FAR: f64 = 0.97;
 /// Samples for every pixel up to which a plan is never cut: less would hardly pay for the look before it.
 const LEAST_UNCUT: f64 = 16.0;
@@ -131,7 +132,7 @@ pub(super) fn share_of_even(energies: &[f64]) -> f64 {
 /// Energies of one sample with their mean added, and none much above it.
 ///
 /// Without the mean, noisy pixels starve the rest: a dark room denoised by Open Image Denoise had JOD 9.52 at 256 samples a pixel
-/// where even counts have 9.74, with it 9.74; at 32 samples 9.50 and 9.55, even 9.44 (`benches/results/denoising.md`).
+/// where even counts have 9.74; with it 0.02 to 0.07 more than even counts from 8 to 256 (`benches/results/denoising.md`).
 pub(super) fn defended(energies: &[f32]) -> Vec<f64> {
     let energies = || energies.iter().map(|&energy| f64::from(energy));
     let mean = energies().filter(|energy| energy.is_finite()).sum::<f64>() / energies().len().max(1) as f64;

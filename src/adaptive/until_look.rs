@@ -24,7 +24,7 @@ const SAMPLES_OF_A_BUILTIN_LOOK: f64 = 3.0;
 const LEAST_SAMPLES_BETWEEN_LOOKS: f64 = SAMPLES_OF_AN_OIDN_LOOK;
 /// Most that comes between two looks, as a share of what is there.
 const MOST_GROWTH: f64 = 3.0;
-/// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes 0.8 to 2.9 times
+/// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes 0.8 to 2.7 times
 /// better at 32 samples, one of them 4.4 times at 8 (`benches/results/denoising.md`).
 const MOST_GAIN: f64 = 3.0;
 /// Doublings of a pixel in one plan.

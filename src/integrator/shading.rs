@@ -81,6 +81,13 @@ impl Reader<'_> {
         [first * scale, second * scale]
     }
 
+    /// What a thin sheet reflects and lets through: a channel that would make light is scaled down, and no other.
+    fn of_sheet(&self, reflectance: &ColorInput, transmittance: &ColorInput) -> [Vec3; 2] {
+        let (reflected, transmitted) = (self.color(reflectance), self.color(transmittance));
+        let excess = (reflected + transmitted).max(Vec3::ONE);
+        [reflected / excess, transmitted / excess]
+    }
+
     fn facets(&self, roughness: &Roughness) -> Microfacets {
         let u = slope_width(roughness.scale, self.scalar(&roughness.u));
         let v = roughness.v.as_ref().map_or(u, |v| slope_width(roughness.scale, self.scalar(v)));
@@ -135,7 +142,7 @@ impl Reader<'_> {
                 Bsdf::oren_nayar(self.base(reflectance), self.scalar(roughness))
             }
             (Surface::DiffuseTransmission { reflectance, transmittance }, _) => {
-                let [reflected, transmitted] = self.shares(reflectance, transmittance);
+                let [reflected, transmitted] = self.of_sheet(reflectance, transmittance);
                 Bsdf::diffuse_transmission(reflected, transmitted)
             }
             (Surface::Mirror { reflectance }, _) => Bsdf::mirror(self.color(reflectance)),

@@ -70,6 +70,20 @@ fn vertex_colours_multiply_the_albedo() {
     }
 }
 
+/// A channel that would make light is scaled down, and takes no other with it.
+#[test]
+fn sheets_make_no_light_in_any_channel() {
+    let albedo = ColorInput::constant(Vec3::new(0.8, 0.2, 0.1));
+    let sheet = Surface::DiffuseTransmission { reflectance: albedo, transmittance: albedo };
+    let mut scene = empty_scene();
+    scene.environment = constant_environment(1.0);
+    let material = add_material(&mut scene, sheet, Vec3::ZERO);
+    add_rectangle(&mut scene, Vec3::new(-1.0, -1.0, 0.0), 2.0 * Vec3::X, 2.0 * Vec3::Y, material);
+    let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
+    let (mean, _) = radiance_along(&tracer, Ray::new(vec3a(0.1, 0.2, 5.0), Vec3A::NEG_Z), 1, 16);
+    assert!(mean.abs_diff_eq(Vec3::new(1.0, 0.4, 0.2), 1e-4), "{mean}");
+}
+
 #[test]
 fn mirrors_return_their_reflectance() {
     let reflectance = Vec3::new(0.9, 0.5, 0.1);

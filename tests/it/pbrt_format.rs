@@ -16,7 +16,9 @@ fn folder() -> tempfile::TempDir {
     half.save(folder.path().join("grey.png")).unwrap();
     image::RgbImage::from_pixel(2, 2, image::Rgb([0, 255, 255])).save(folder.path().join("cyan.png")).unwrap();
     let leaf = image::RgbaImage::from_fn(4, 2, |x, _| image::Rgba([0, 255, 0, if x < 1 { 255 } else { 0 }]));
-    leaf.save(folder.path().join("leaf.png")).unwrap();
+    for name in ["leaf.png", "leaf.tga"] {
+        leaf.save(folder.path().join(name)).unwrap();
+    }
     folder
 }
 
@@ -75,7 +77,15 @@ fn what_is_not_rendered_is_told() {
         (r#"MakeNamedMedium "m" "rgb sigma_s" [0 0 0] "rgb Le" [5 5 5]"#, r#"medium "m": not used: "rgb Le"."#),
         (r#"LightSource "distant" "float power" 10"#, r#"light "distant": not used: "float power"."#),
         (
+            r#"Material "diffusetransmission" "rgb reflectance" [0.8 0.2 0.1] "rgb transmittance" [0.8 0.2 0.1]"#,
+            "make light together, [1.6, 0.4, 0.2]: both are scaled down to 1 in each such channel.",
+        ),
+        (
             r#"MakeNamedMedium "m" "rgb sigma_s" [0 0 0] MediumInterface "" "m" ReverseOrientation"#,
+            "the medium outside of a reversed shape is not rendered.",
+        ),
+        (
+            r#"MakeNamedMedium "m" "rgb sigma_s" [0 0 0] MediumInterface "" "m" Scale -1 1 1 Shape "disk""#,
             "the medium outside of a reversed shape is not rendered.",
         ),
     ] {
@@ -231,6 +241,32 @@ fn a_number_of_a_picture_is_its_alpha_or_its_mean() {
     assert!(alpha("grey.png").iter().all(|share| (share - grey).abs() < 1e-4), "{:?}", alpha("grey.png"));
 }
 
+/// pbrt's `Image::Read` takes all but PNG and light for sRGB and drops their alpha.
+#[test]
+fn pictures_that_pbrt_leaves_to_stb_are_srgb_without_alpha() {
+    let folder = folder();
+    for name in ["grey.tga", "grey.bmp"] {
+        image::GrayImage::from_pixel(2, 2, image::Luma([128])).save(folder.path().join(name)).unwrap();
+    }
+    let alpha = |picture: &str| {
+        let texture = format!("Texture \"a\" \"float\" \"imagemap\" \"string filename\" {picture} ");
+        let world = format!("{texture} {SQUARE} \"texture alpha\" \"a\"");
+        let scene = try_load(folder.path(), "", &world).unwrap_or_else(|error| panic!("{error}"));
+        let (Alpha::Mask { value, .. } | Alpha::Blend { value }) = scene.materials[0].alpha else { panic!("no alpha") };
+        value.evaluate(&scene.textures, Vec2::new(0.625, 0.5))
+    };
+    let grey = srgb_to_linear(128.0 / 255.0);
+    for (picture, expected) in [
+        (r#""leaf.png""#, 0.0),
+        (r#""leaf.tga""#, 1.0 / 3.0),
+        (r#""grey.png" "string encoding" "linear""#, 128.0 / 255.0),
+        (r#""grey.tga" "string encoding" "linear""#, grey),
+        (r#""grey.bmp" "string encoding" "gamma 1.5""#, grey),
+    ] {
+        assert!((alpha(picture) - expected).abs() < 1e-4, "{picture}: {}, not {expected}", alpha(picture));
+    }
+}
+
 /// What has no place for a picture takes its mean; it took 1.
 #[test]
 fn pictures_inside_others_count_by_their_mean() {
@@ -300,6 +336,83 @@ fn a_whole_disk_has_pbrts_coordinates() {
     let up = mesh.positions.iter().position(|p| p.abs_diff_eq(Vec3::new(0.0, 2.0, 1.0), 1e-5)).unwrap();
     // A quarter turn, v = 0 at the rim; our v runs the other way.
     assert!(mesh.uvs[up].abs_diff_eq(Vec2::new(0.25, 1.0), 1e-6), "{}", mesh.uvs[up]);
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Facing {
+    AsMade,
+    TurnedOver,
+}
+
+/// Where the front of the only shape is, in its own coordinates: spheres, disks and cylinders are made to face outwards or up.
+fn facing(scene: &Scene) -> Facing {
+    let Some(instance) = scene.instances.first() else { return Facing::AsMade };
+    let mesh = &scene.meshes[instance.mesh.0 as usize];
+    let as_made = mesh.triangles.iter().filter(|triangle| {
+        let [a, b, c] = triangle.map(|index| mesh.positions[index as usize]);
+        (b - a).cross(c - a).dot(a + b + c) > 0.0
+    });
+    match as_made.count() {
+        0 => Facing::TurnedOver,
+        count if count == mesh.triangles.len() => Facing::AsMade,
+        count => panic!("{count} of {} triangles face outwards", mesh.triangles.len()),
+    }
+}
+
+/// pbrt's `Sphere`, `Disk` and `Cylinder::InteractionFromIntersection`; shapes that move have its `identity` for a transform.
+#[test]
+fn mirroring_turns_quadrics_over_and_no_mesh() {
+    use Facing::{AsMade, TurnedOver};
+    let glass = r#"Material "dielectric""#;
+    let light = r#"AreaLightSource "diffuse" "rgb L" [1 1 1]"#;
+    let mesh = r#"Shape "trianglemesh" "point3 P" [0 0 1 1 0 1 0 1 1]"#;
+    for (change, quadric, of_mesh) in [
+        ("", AsMade, AsMade),
+        ("Scale 2 1 1", AsMade, AsMade),
+        ("ReverseOrientation", TurnedOver, TurnedOver),
+        ("Scale -1 1 1", TurnedOver, AsMade),
+        ("ReverseOrientation Scale -1 1 1", AsMade, TurnedOver),
+        ("Scale -1 1 1 Scale 1 -1 1", AsMade, AsMade),
+        ("Scale -1 1 1 ActiveTransform EndTime Translate 1 0 0", AsMade, AsMade),
+    ] {
+        for kind in [
+            r#""sphere""#,
+            r#""sphere" "float zmax" 0.5"#,
+            r#""disk" "float height" 1"#,
+            r#""disk" "float height" 1 "float phimax" 90"#,
+            r#""cylinder""#,
+        ] {
+            for surface in [glass, light] {
+                assert_eq!(
+                    facing(&scene("", &format!("{surface} {change} Shape {kind}"))),
+                    quadric,
+                    "{change}, {kind}"
+                );
+            }
+        }
+        assert_eq!(facing(&scene("", &format!("{glass} {change} {mesh}"))), of_mesh, "{change}");
+    }
+    // A front that does not show leaves it analytic.
+    for (material, expected) in [(r#""diffuse""#, AsMade), (r#""diffuse" "string normalmap" "cyan.png""#, TurnedOver)] {
+        assert_eq!(
+            facing(&scene("", &format!("Scale -1 1 1 Material {material} Shape \"sphere\""))),
+            expected,
+            "{material}"
+        );
+    }
+}
+
+/// What a grid would have at a pole or in a disk's middle.
+#[test]
+fn curved_shapes_have_no_triangles_without_area() {
+    for shape in [
+        r#"Material "dielectric" ReverseOrientation Shape "sphere""#,
+        r#"Shape "sphere" "float zmax" 0.5"#,
+        r#"Shape "disk" "float phimax" 180"#,
+    ] {
+        let scene = scene("", shape);
+        assert!(!scene.notes.iter().any(|note| note.contains("without area")), "{shape}: {:?}", scene.notes);
+    }
 }
 
 #[test]

@@ -25,6 +25,8 @@ pub(super) enum Number {
     /// Alpha, decoded as the colours are, and where all of it is 1 the mean of R, G and B, as in pbrt-v4 (`MIPMap::Bilerp<Float>`,
     /// `MIPMap::CreateFromFile`).
     AlphaOrMean,
+    /// The mean of R, G and B whatever alpha is, as in pbrt-v4 of pictures whose alpha it drops.
+    Mean,
 }
 
 impl Adjust {
@@ -34,7 +36,7 @@ impl Adjust {
     /// What the values of the picture are.
     pub(super) fn values(self, encoding: Encoding) -> Values {
         match (encoding, self.to_number) {
-            (Encoding::Linear, _) | (_, Some(Number::AlphaOrMean)) => Values::Numbers,
+            (Encoding::Linear, _) | (_, Some(Number::AlphaOrMean | Number::Mean)) => Values::Numbers,
             (Encoding::Srgb, None) => Values::Colours,
             (Encoding::Srgb, Some(Number::Luminance)) => Values::Luminances,
         }
@@ -66,7 +68,7 @@ impl Adjust {
         if exponent != 1.0 {
             color = color.max(Vec3::ZERO).powf(exponent);
         }
-        if self.to_number == Some(Number::AlphaOrMean) {
+        if matches!(self.to_number, Some(Number::AlphaOrMean | Number::Mean)) {
             color = Vec3::splat(color.element_sum() / 3.0);
         }
         if let Some(bits) = self.inverted_scale_bits {

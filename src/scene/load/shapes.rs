@@ -159,6 +159,12 @@ pub fn face_along_normals(mesh: &mut Mesh) {
     }
 }
 
+/// Whether a triangle has an area: by f64, or small ones far from the origin would have none by rounding.
+pub(super) fn has_area(positions: &[Vec3], triangle: &[u32; 3]) -> bool {
+    let [a, b, c] = triangle.map(|index| positions[index as usize].as_dvec3());
+    (b - a).cross(c - a).length_squared() > 0.0
+}
+
 /// Makes its back its front.
 pub(super) fn turn_over(mesh: &mut Mesh) {
     mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));

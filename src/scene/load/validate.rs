@@ -5,6 +5,7 @@
 
 use super::builder::Builder;
 use super::error::LoadError;
+use super::shapes;
 use crate::scene::{Alpha, Instance, Mesh, MeshId, Scene, Surface};
 use glam::{Affine3A, Vec2, Vec3};
 use std::path::Path;
@@ -120,11 +121,7 @@ fn check_extent(builder: &Builder, path: &Path) -> Result<(), LoadError> {
 fn drop_degenerate(mesh: &mut Mesh) -> usize {
     let before = mesh.triangles.len();
     let Mesh { positions, triangles, .. } = mesh;
-    triangles.retain(|&[a, b, c]| {
-        let [a, b, c] = [a, b, c].map(|index| positions[index as usize].as_dvec3());
-        // f64, or small triangles far from the origin would vanish by rounding.
-        (b - a).cross(c - a).length_squared() > 0.0
-    });
+    triangles.retain(|triangle| shapes::has_area(positions, triangle));
     before - triangles.len()
 }
 

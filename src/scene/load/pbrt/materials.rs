@@ -204,10 +204,18 @@ impl Reader<'_> {
         let scale = parameters.float_or("scale", 1.0)?.max(0.0);
         let scaled = |color: ColorInput| ColorInput { factor: color.factor * scale, ..color };
         let transmittance = self.color_input(parameters, "transmittance", Meaning::Reflectance)?;
-        Ok(Surface::DiffuseTransmission {
-            reflectance: scaled(self.reflectance(parameters, 0.25)?),
-            transmittance: scaled(transmittance.unwrap_or(ColorInput::constant(Vec3::splat(0.25)))),
-        })
+        let transmittance = scaled(transmittance.unwrap_or(ColorInput::constant(Vec3::splat(0.25))));
+        let reflectance = scaled(self.reflectance(parameters, 0.25)?);
+        if reflectance.texture.is_none() && transmittance.texture.is_none() {
+            let sum = reflectance.factor.min(Vec3::ONE) + transmittance.factor.min(Vec3::ONE);
+            if sum.max_element() > 1.0 {
+                self.builder.note(format!(
+                    "{}: \"reflectance\" and \"transmittance\" make light together, {sum}: both are scaled down to 1 in each such channel.",
+                    parameters.place()
+                ));
+            }
+        }
+        Ok(Surface::DiffuseTransmission { reflectance, transmittance })
     }
 
     fn note_coat(&mut self, parameters: &Parameters) {

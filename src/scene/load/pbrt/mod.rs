@@ -208,9 +208,6 @@ impl Reader<'_> {
         let light = self.current_light();
         let alpha = AlphaKey::of(shape)?;
         let medium = self.state.inside_medium.clone();
-        if self.state.reverse_orientation && medium.is_none() && self.state.outside_medium.is_some() {
-            self.builder.note(format!("{}: the medium outside of a reversed shape is not rendered.", shape.place()));
-        }
         // Luminous power is shared out over each shape's own area: such materials are never the same.
         let has_power = light.as_ref().is_some_and(|light| light.float("power").is_ok_and(|power| power.is_some()));
         let key = MaterialKey {

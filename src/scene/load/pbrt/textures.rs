@@ -32,10 +32,59 @@ impl Definition {
     }
 }
 
-/// Whether a picture's numbers are light, by its name.
-fn holds_light(file: &Path) -> bool {
-    let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
-    ending.is_some_and(|ending| ["exr", "hdr", "pfm"].iter().any(|light| ending == *light))
+/// What a picture is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wanted {
+    Color,
+    Number,
+}
+
+/// How pbrt reads a picture (`Image::Read`), by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reading {
+    /// Its numbers are light, which no curve encodes.
+    Light,
+    /// Encoded as the texture says, alpha and all.
+    AsTold,
+    /// As sRGB whatever the texture says, and its alpha dropped.
+    AsSrgb,
+}
+
+impl Reading {
+    fn of(file: &Path) -> Self {
+        let ending = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        match ending.as_str() {
+            "exr" | "hdr" | "pfm" => Self::Light,
+            "jpg" | "jpeg" | "tga" | "bmp" => Self::AsSrgb,
+            _ => Self::AsTold,
+        }
+    }
+
+    fn number(self) -> Number {
+        match self {
+            Self::Light | Self::AsTold => Number::AlphaOrMean,
+            Self::AsSrgb => Number::Mean,
+        }
+    }
+}
+
+/// The curve of a picture, and the exponent that follows it.
+fn encoding(parameters: &Parameters, reading: Reading) -> Result<(Encoding, f32), LoadError> {
+    let told = match parameters.string("encoding")? {
+        None | Some("sRGB") => (Encoding::Srgb, 1.0),
+        Some("linear") => (Encoding::Linear, 1.0),
+        Some(other) => match other.strip_prefix("gamma ").and_then(|gamma| gamma.trim().parse::<f32>().ok()) {
+            Some(gamma) if gamma > 0.0 && gamma.is_finite() => (Encoding::Linear, gamma),
+            _ => {
+                return Err(parameters.error(format_args!("encoding \"{other}\": expected sRGB, linear or gamma G")));
+            }
+        },
+    };
+    Ok(match reading {
+        Reading::Light => (told.0, 1.0),
+        Reading::AsTold => told,
+        Reading::AsSrgb => (Encoding::Srgb, 1.0),
+    })
 }
 
 impl Reader<'_> {
@@ -63,7 +112,7 @@ impl Reader<'_> {
                 Ok(ColorInput::constant(value))
             }
             "imagemap" => {
-                let (lookup, scale) = self.image(parameters, None)?;
+                let (lookup, scale) = self.image(parameters, Wanted::Color)?;
                 Ok(ColorInput { factor: Vec3::splat(scale), texture: Some(lookup) })
             }
             "scale" => self.scaled(Combination { parameters, name, depth }),
@@ -97,7 +146,7 @@ impl Reader<'_> {
         match definition.kind.as_str() {
             "constant" => Ok(ScalarInput::constant(parameters.float_or("value", 1.0)?)),
             "imagemap" => {
-                let (lookup, factor) = self.image(parameters, Some(Number::AlphaOrMean))?;
+                let (lookup, factor) = self.image(parameters, Wanted::Number)?;
                 Ok(ScalarInput { factor, texture: Some((lookup, 0)) })
             }
             "scale" => self.scaled(Combination { parameters, name, depth }),
@@ -181,25 +230,13 @@ impl Reader<'_> {
     }
 
     /// An image file, of colours or of some number, and its scale.
-    fn image(&mut self, parameters: &Parameters, of_number: Option<Number>) -> Result<(TextureLookup, f32), LoadError> {
+    fn image(&mut self, parameters: &Parameters, wanted: Wanted) -> Result<(TextureLookup, f32), LoadError> {
         let Some(file) = parameters.string("filename")? else {
             return Err(parameters.error("an imagemap needs a \"string filename\""));
         };
         let file = self.file(file);
-        let (encoding, exponent) = match parameters.string("encoding")? {
-            None | Some("sRGB") => (Encoding::Srgb, 1.0),
-            Some("linear") => (Encoding::Linear, 1.0),
-            Some(other) => match other.strip_prefix("gamma ").and_then(|gamma| gamma.trim().parse::<f32>().ok()) {
-                // What holds light itself is not encoded.
-                Some(gamma) if gamma > 0.0 && gamma.is_finite() && holds_light(&file) => (Encoding::Linear, 1.0),
-                Some(gamma) if gamma > 0.0 && gamma.is_finite() => (Encoding::Linear, gamma),
-                _ => {
-                    return Err(
-                        parameters.error(format_args!("encoding \"{other}\": expected sRGB, linear or gamma G"))
-                    );
-                }
-            },
-        };
+        let reading = Reading::of(&file);
+        let (encoding, exponent) = encoding(parameters, reading)?;
         let wrap = match parameters.string("wrap")? {
             None | Some("repeat") => Wrap::Repeat,
             Some("clamp") => Wrap::Clamp,
@@ -218,7 +255,7 @@ impl Reader<'_> {
         let inverts = parameters.boolean_or("invert", false)?;
         let mut lookup = self.mapping(parameters)?;
         // A picture of one channel is its number already, and stays small. pbrt drops its alpha.
-        let to_number = of_number.filter(|_| !is_grey(&file));
+        let to_number = (wanted == Wanted::Number && !is_grey(&file)).then(|| reading.number());
         lookup.texture = self.builder.textures.add(Request {
             picture: Picture::File(file),
             encoding,
