@@ -147,7 +147,7 @@ impl Shown<'_> {
         if variance <= 0.0 {
             return 0.0;
         }
-        // Distances of the outer points from the mean. At M = √3 σ both forms agree.
+        // Distances of the outer points from the mean. At M = √3 σ both pairs agree.
         let gauss = (3.0 * variance).sqrt();
         let (below, above) = if mean >= gauss { (gauss, gauss) } else { (mean, (3.0 * variance / mean).min(1e30)) };
         if below <= 0.0 || !above.is_finite() {

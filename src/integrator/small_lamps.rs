@@ -55,7 +55,7 @@ impl PathTracer {
     /// What is known of such lamps before the first sample. None where there are none.
     pub fn known_lamps(&self) -> Option<KnownLamps> {
         let mut shares = Shares::new(self.settings.film_area(), self.settings.filter.density());
-        let mut pixels_left = MOST_PIXELS;
+        let (mut pixels_left, mut rays_left) = (MOST_PIXELS, MOST_RAYS);
         for moment in self.moments() {
             let camera = self.camera.at(moment.time);
             let spots = self.spots_at(&moment);
@@ -65,9 +65,10 @@ impl PathTracer {
                 let lens = lens_points(spot, (moment.number + number) * points_of_each, points_of_each);
                 let way_px = spot.velocity_px / moment.of as f32;
                 pixels_left -= lens.len() as f64 * shares.pixels_of(spot.spread_px, way_px);
-                if pixels_left < 0.0 {
+                if pixels_left < 0.0 || rays_left < lens.len() {
                     break;
                 }
+                rays_left -= lens.len();
                 let area_px2 = spot.area_px2 / (lens.len() * moment.of) as f32;
                 for place_px in lens.into_iter().filter_map(|lens| self.seen_at(&camera, spot, lens)) {
                     let Spot { spread_px, luminance, .. } = *spot;

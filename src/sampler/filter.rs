@@ -86,7 +86,14 @@ impl PixelFilter {
     pub fn height(self, offset_px: f32) -> f32 {
         let within = |radius_px: f32, height: f32| if offset_px.abs() < radius_px { height } else { 0.0 };
         match self {
-            PixelFilter::Box => within(0.5, 1.0),
+            // What is right between two pixels is in one of them.
+            PixelFilter::Box => {
+                if (-0.5..0.5).contains(&offset_px) {
+                    1.0
+                } else {
+                    0.0
+                }
+            }
             PixelFilter::Gaussian => within(GAUSSIAN_RADIUS_PX, (-0.5 * (offset_px / GAUSSIAN_SIGMA_PX).powi(2)).exp()),
             PixelFilter::BlackmanHarris => within(
                 BLACKMAN_HARRIS.radius_px,

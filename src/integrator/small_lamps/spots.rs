@@ -7,7 +7,7 @@ use super::strip::Strip;
 use crate::film::opponent;
 use crate::light::{LampPart, LampShape};
 use glam::{Vec2, Vec3};
-use std::f32::consts::PI;
+use std::f32::consts::{PI, TAU};
 
 /// Strips are cut into slices no longer than this share of what is small where they are.
 const SLICE: f32 = 0.5;
@@ -99,7 +99,7 @@ impl<'a> Spots<'a> {
                     self.add_triangle(corners, around, luminance);
                 }
             }
-            LampShape::Sphere { center, radius } => self.found.extend(self.sphere(center, radius, around, luminance)),
+            LampShape::Sphere { center, radius } => self.add_sphere(center, radius, around, luminance),
         }
     }
 
@@ -109,15 +109,27 @@ impl<'a> Spots<'a> {
         Some(Around { blur_px: self.camera.blur_px(center), velocity_px: way_px / self.step })
     }
 
-    /// A sphere that is smaller than a pixel, or than what is small there.
-    fn sphere(&self, center: Vec3, radius: f32, around: Around, luminance: f32) -> Option<Spot> {
-        let place_px = self.camera.project(center)?;
-        let to_side = radius * self.camera.way_to(center).try_normalize()?.any_orthonormal_vector();
-        let radius_px = (self.camera.project(center + to_side)? - place_px).length();
+    /// A sphere that is smaller than a pixel, or than what is small there, as spots of one size: what is before its middle may hide it in part.
+    fn add_sphere(&mut self, center: Vec3, radius: f32, around: Around, luminance: f32) {
+        /// Spots around the one in the middle.
+        const AROUND: usize = 6;
+        /// How far those are from it, over the radius.
+        const AWAY: f32 = 0.72;
+        let Some(axis) = self.camera.way_to(center).try_normalize() else { return };
+        let (right, up) = axis.any_orthonormal_pair();
+        let places_px = [center, center + radius * right].map(|position| self.camera.project(position));
+        let [Some(place_px), Some(side_px)] = places_px else { return };
+        let radius_px = (side_px - place_px).length();
         let is_small = 2.0 * radius_px <= around.small_px().max(1.0);
-        let area_px2 = PI * radius_px * radius_px;
-        (is_small && self.is_near(place_px, self.border_px(&around)))
-            .then(|| around.spot(center, area_px2, radius, luminance))
+        if !is_small || !self.is_near(place_px, self.border_px(&around)) {
+            return;
+        }
+        let area_px2 = PI * radius_px * radius_px / (AROUND + 1) as f32;
+        let ring = (0..AROUND).map(|number| Vec2::from_angle(TAU * number as f32 / AROUND as f32) * (AWAY * radius));
+        for aside in ring.chain([Vec2::ZERO]) {
+            let position = center + aside.x * right + aside.y * up;
+            self.found.push(around.spot(position, area_px2, radius, luminance));
+        }
     }
 
     /// How far outside the film something may be and yet shine into it.
