@@ -17,6 +17,9 @@ const FEWEST_MEETINGS: f64 = 1.0;
 const FOUND_ANYWAY: f32 = 0.5;
 /// A pixel gets no more samples than this, and none for a lamp that these would not meet once.
 const MOST_SAMPLES: f64 = 4096.0;
+/// What less of a pixel's samples meets is left to chance: most pixels never have so many. The pixel filter's tails hold as little of the sun, and
+/// show white after its first meeting.
+const LEAST_SHARE: f32 = 1.0 / 65_536.0;
 /// Of the pilot's samples, what this may take.
 const MOST_OF_PILOT: f64 = 0.5;
 
@@ -74,10 +77,12 @@ pub(super) fn unmet_noise(
     }))
 }
 
-/// How often a pixel's samples are expected to have met its known lamps, where that is fewer than [`MEETINGS`] times; `None` where it has none.
+/// How often a pixel's samples are expected to have met its known lamps, where that is fewer than [`MEETINGS`] times; `None` where it has none,
+/// or less than [`LEAST_SHARE`].
 pub(super) fn few_meetings(film: &Film, pixel: usize) -> Option<f64> {
-    let expected = f64::from(film.known_lamps.as_ref()?.share(pixel)) * f64::from(film.samples(pixel));
-    (expected > 0.0 && expected < MEETINGS).then_some(expected)
+    let share = film.known_lamps.as_ref()?.share(pixel);
+    let expected = f64::from(share) * f64::from(film.samples(pixel));
+    (share >= LEAST_SHARE && expected < MEETINGS && expected > 0.0).then_some(expected)
 }
 
 /// The mean of what depends on a count that is `expected` on average, but for a hundred-thousandth of the cases.

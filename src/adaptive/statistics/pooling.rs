@@ -133,20 +133,18 @@ struct AsNeighbour {
 
 impl PixelSurfaces<'_> {
     fn as_neighbour(&self, pixel: usize) -> AsNeighbour {
-        /// A lamp that more of a pixel's samples meets sets it apart from pixels without it.
-        const LEAST_SHARE: f32 = 1e-4;
         /// How far: such a pixel weighs nothing beside others, however strong its noise.
         const APART: f32 = 1e10;
         let mut looks = looks(&self.guides[pixel]);
         let share = self.known_lamps.map_or(0.0, |lamps| lamps.share(pixel));
-        if share <= LEAST_SHARE {
+        if share == 0.0 {
             // Never 0, so that a lone pixel still learns something.
             return AsNeighbour { looks, least_weight: 0.02 };
         }
         // The noise of the sun's rim is not that of the sky around it: told of a thousandth of it, 144 pixels of sky had 18,626 samples where
         // 16 are enough. Apart along another axis than the depth, where that is all that is left of a number.
         looks[LOOKS] += APART;
-        looks[DEPTH_LOOK] += libm::logf(share / LEAST_SHARE);
+        looks[DEPTH_LOOK] += libm::logf(share);
         AsNeighbour { looks, least_weight: 0.0 }
     }
 }
