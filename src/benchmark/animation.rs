@@ -152,6 +152,8 @@ struct Bench<'a> {
     settings: &'a AnimationSettings,
     name: String,
     source: Files<'a>,
+    /// As the scene begins: what the shot is shown by.
+    first_scene: Arc<Scene>,
     shot: ShotSettings,
     track: Track,
     scenes: Vec<Arc<Scene>>,
@@ -160,6 +162,7 @@ struct Bench<'a> {
 impl<'a> Bench<'a> {
     fn new(settings: &'a AnimationSettings, path: &'a Path, name: String, rate: f64) -> Result<Self> {
         let source = Files(path);
+        let first_scene = source.at(0.0)?;
         let viewing = viewing(&settings.display)?;
         let denoiser = settings.denoiser.map(Denoiser::open).transpose()?;
         let mut limits = Limits::of_visibility(settings.visibility);
@@ -176,19 +179,18 @@ impl<'a> Bench<'a> {
             sampling: Sampling::Adaptive,
             limits,
             viewing,
-            nits_per_unit: source.at(0.0)?.nits_per_unit,
+            nits_per_unit: first_scene.nits_per_unit,
             adapted_to_cd_m2: None,
             gaze: None,
             denoiser,
             eye: Eye::Rests,
             velocity_of: VelocityOf::Surface,
         };
-        let first_scene = source.at(0.0)?;
         let operator = tone_operator(&first_scene)?;
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;
         let scenes = (shot.first..=shot.last).map(|frame| source.at(shot.seconds(f64::from(frame))));
         let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { settings, name, source, shot, track, scenes })
+        Ok(Self { settings, name, source, first_scene, shot, track, scenes })
     }
 
     fn row(&self) -> Result<AnimationRow> {
@@ -261,9 +263,7 @@ impl<'a> Bench<'a> {
     fn with_budget(&self, mean_samples: u32) -> Result<Rendition> {
         let limits = Limits { visibility: None, mean_samples: Some(mean_samples), ..self.shot.limits };
         let shot = self.variant(false, limits);
-        let first_scene = self.source.at(0.0)?;
-        tone_operator(&first_scene)?;
-        let operator = || tone_operator(&first_scene).expect("there was one before");
+        let operator = || tone_operator(&self.first_scene).expect("the shot was shown by it");
         let mut track = Track::make(&self.source, &shot, operator().as_ref(), &|_| {})?;
         let needs = Needs::of(&self.source, &shot, &operator, &track)?;
         track.spread(&needs, mean_samples, limits.last_rung());
