@@ -4,7 +4,7 @@
 
 use super::judge::Judgement;
 use super::plan::{cut_to_budget, doubling_plan};
-use super::small_lamps::few_meetings;
+use super::small_things::few_meetings;
 use crate::film::Film;
 use crate::integrator::{BlockWork, SamplePlan};
 use crate::sampler::Half;
@@ -146,7 +146,7 @@ mod tests {
     use super::super::plan::plan_up_to;
     use super::super::test_films::{film_of, film_of_halves, settings};
     use super::*;
-    use crate::film::{BlockSum, KnownLamps};
+    use crate::film::{BlockSum, KnownThings};
     use crate::integrator::PathSample;
     use glam::Vec3;
 
@@ -225,9 +225,9 @@ mod tests {
     fn unmet_lamps_are_urgent_alike() {
         let lucky = |pixel: u32| pixel % 64 < 8 && pixel.is_multiple_of(5);
         let mut film = film_of(|pixel, random| Vec3::splat(if lucky(pixel) { 5.0 } else { 0.1 + 0.02 * random }));
-        let mut lamps = KnownLamps::new(film.pixel_count());
+        let mut lamps = KnownThings::new(film.pixel_count());
         (0..film.pixel_count()).filter(|pixel| pixel % 64 < 8).for_each(|pixel| lamps.add(pixel, 0.005, 200.0, true));
-        film.known_lamps = Some(lamps);
+        film.known_things = Some(lamps);
         let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
         let energies = Energies::of(&film, &judgement);
         for half in Half::BOTH {

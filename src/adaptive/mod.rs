@@ -21,7 +21,7 @@ mod progress;
 pub mod pursuit;
 pub mod rivals;
 pub mod settings;
-mod small_lamps;
+mod small_things;
 pub mod state;
 pub mod statistics;
 mod stop;
@@ -128,7 +128,7 @@ struct Loop<'a> {
     resumed_at: Instant,
     seconds_before: f64,
     looked: Option<Looked>,
-    /// [`small_lamps::samples_to_meet`] lamps smaller than a pixel, once it was asked for.
+    /// [`small_things::samples_to_meet`] lamps smaller than a pixel, once it was asked for.
     samples_to_meet_lamps: OnceCell<Option<Vec<u32>>>,
 }
 
@@ -239,8 +239,8 @@ impl<'a> Loop<'a> {
         let rungs = settings.rungs().into_iter().filter(is_left).collect();
         let seconds_before = state.seconds.total;
         let mut state = state.kept_to(&settings.limits);
-        if state.film.known_lamps.is_none() {
-            state.film.known_lamps = tracer.known_lamps();
+        if state.film.known_things.is_none() {
+            state.film.known_things = tracer.known_things();
         }
         Self {
             tracer,

@@ -10,7 +10,7 @@ use super::plan::{
 };
 use super::rivals::{rival_plan, rival_stop};
 use super::settings::{LoopSettings, Sampling, THRESHOLD};
-use super::small_lamps::samples_to_meet;
+use super::small_things::samples_to_meet;
 use super::state::Exposure;
 use super::stop::{LEAST_SAVING, predicted_saving};
 use super::until_look::UntilLook;
@@ -92,7 +92,7 @@ impl Loop<'_> {
     /// that is denoised.
     pub(super) fn plans_without_a_look(&mut self) -> Result<bool, JudgeError> {
         let left = self.left_of_budget();
-        if let Some(plan) = self.plan_to_meet_small_lamps(left) {
+        if let Some(plan) = self.plan_to_meet_small_things(left) {
             self.enter(plan);
             return Ok(true);
         }
@@ -135,13 +135,13 @@ impl Loop<'_> {
             return None;
         }
         let of_lamps = || {
-            let shares: Vec<f32> = self.state.film.known_lamps.as_ref()?.main_shares().collect();
+            let shares: Vec<f32> = self.state.film.known_things.as_ref()?.urgent_shares().collect();
             samples_to_meet(&shares, &self.settings.limits)
         };
         self.samples_to_meet_lamps.get_or_init(of_lamps).as_deref()
     }
 
-    fn plan_to_meet_small_lamps(&self, left: u64) -> Option<SamplePlan> {
+    fn plan_to_meet_small_things(&self, left: u64) -> Option<SamplePlan> {
         let wanted = self.samples_to_meet_lamps()?;
         some(plan_up_to(&self.state.film, |pixel| wanted[pixel])).filter(|plan| plan.samples() <= left)
     }

@@ -51,7 +51,7 @@ impl SampleStatistics {
             .with_min_len(PIXELS_A_TASK)
             .map(|i| PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i])))
             .collect();
-        let surfaces = PixelSurfaces { guides: film.guides(), known_lamps: film.known_lamps.as_ref() };
+        let surfaces = PixelSurfaces { guides: film.guides(), known_things: film.known_things.as_ref() };
         let pooled = pooled_by_neighbours(&evidence, &surfaces, width);
         let channels = pooled.map(|Pooled { variance, factor, factor_with_own }| ChannelStatistics {
             pooled: variance,

@@ -7,7 +7,7 @@ mod block_sum;
 mod estimate;
 mod guide;
 mod halves;
-mod known_lamps;
+mod known_things;
 mod merge;
 #[cfg(test)]
 mod of_samples;
@@ -17,7 +17,7 @@ pub use block_sum::BlockSum;
 pub use estimate::Estimate;
 pub use guide::{PixelGuide, Seen};
 pub use halves::{Halves, share_of_mean};
-pub use known_lamps::KnownLamps;
+pub use known_things::KnownThings;
 #[cfg(test)]
 pub(crate) use of_samples::film_of_samples;
 
@@ -106,9 +106,9 @@ pub struct Film {
     pub nonfinite_samples: u64,
     /// Rays traced.
     pub rays: u64,
-    /// What is known of lamps that its samples may pass by, once somebody who knows the scene has said so. Not kept in files.
+    /// What is known of things that its samples may pass by, once somebody who knows the scene has said so. Not kept in files.
     #[serde(skip)]
-    pub known_lamps: Option<KnownLamps>,
+    pub known_things: Option<KnownThings>,
 }
 
 impl Film {
@@ -123,7 +123,7 @@ impl Film {
             guides_of_a: vec![PixelGuide::default(); pixels],
             nonfinite_samples: 0,
             rays: 0,
-            known_lamps: None,
+            known_things: None,
         }
     }
 

@@ -6,6 +6,7 @@
 
 mod collapse;
 mod face;
+mod facet;
 mod mesh_tree;
 pub(crate) mod offset;
 mod simd;
@@ -17,6 +18,7 @@ mod wide_tree;
 mod world;
 
 pub(crate) use face::Face;
+pub use facet::Facet;
 pub(crate) use simd::{VectorWork, prefetch, with_vectors};
 pub use surface::SurfacePoint;
 pub use world::{Ball, Hit, World};

@@ -3,7 +3,7 @@
 //! `path` holds the life of one sample, `path_packet` how several are followed at once, `camera` where they start, `around_camera` in which
 //! volumes, `shading` what a surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand,
 //! `media` what a ray travels in, `light_probes` what light comes where, `prune` which light is left to chance, `thin_sheets` what clear panes
-//! let through, `specular` what mirrors and glass show, `small_lamps` where lamps are that samples may pass by.
+//! let through, `specular` what mirrors and glass show, `small_things` where lamps are that samples may pass by.
 
 mod around_camera;
 mod camera;
@@ -15,7 +15,7 @@ mod path_packet;
 mod prune;
 mod relief;
 mod shading;
-mod small_lamps;
+mod small_things;
 mod specular;
 mod tables;
 mod thin_sheets;
@@ -77,6 +77,13 @@ pub struct Crop {
     pub width: u32,
     /// Rows, at least 1.
     pub height: u32,
+}
+
+impl Crop {
+    /// How many it holds.
+    pub(crate) fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
 }
 
 impl TraceSettings {

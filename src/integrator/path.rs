@@ -148,6 +148,19 @@ impl PathTracer {
         path[0].found()
     }
 
+    /// Radiance of the lamp or the sky that a camera ray leads straight to, without what is absorbed on the way.
+    pub(super) fn light_straight_along(&self, camera_ray: Ray, sample: Sample) -> Vec3 {
+        let mut path = PathState::new(camera_ray, sample, Media::default());
+        match self.world.closest(&camera_ray) {
+            None => self.leave(&mut path, 0),
+            Some(hit) => {
+                let point = self.world.surface(&camera_ray, &hit);
+                self.add_emission(&mut path, &hit, &point);
+            }
+        }
+        path.radiance
+    }
+
     /// Gathers the light of the environment, where the path's ray has hit nothing and the path ends.
     pub(super) fn leave(&self, path: &mut PathState, bounce: u32) {
         if bounce > 0 || !self.settings.transparent {

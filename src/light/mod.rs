@@ -25,7 +25,7 @@ mod tree;
 
 pub use emission::emitted;
 pub use kind_choice::{Arrival, KindsByPlace, LightProbe};
-pub use parts::{LampPart, LampShape};
+pub use parts::LampPart;
 pub use tree::LightReceiver;
 
 use crate::geometry::{Hit, Ray, World};

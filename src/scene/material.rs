@@ -113,6 +113,12 @@ impl Material {
             || self.surface.scalars().into_iter().any(|scalar| scalar.texture.is_some())
     }
 
+    /// What it emits, in scene units, where that is the same all over it: nowhere a picture, nowhere covered by alpha.
+    pub fn even_emission(&self) -> Option<Vec3> {
+        let is_even = self.emission.texture.is_none() && self.alpha == Alpha::Opaque;
+        (is_even && self.emission.factor.max_element() > 0.0).then_some(self.emission.factor)
+    }
+
     /// Mean emitted radiance over the texture's square, in scene units; `None` where nothing is emitted.
     pub fn mean_emission(&self, textures: &[Texture]) -> Option<Vec3> {
         if self.emission.factor.max_element() <= 0.0 {

@@ -7,7 +7,7 @@
 //! - `coverage`: alpha: stacks, spheres, lamps that no ray meets
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
 //! - `bench`: the benchmark from end to end, small
-//! - `small_lamps`: lamps smaller than a pixel, which the first samples may pass by
+//! - `small_lamps`, `lit_things`: lamps and other things smaller than a pixel, and light beside the film, which the first samples may pass by
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `denoise`: denoised pictures: the raw mean beside them, equal bytes, libraries that are not there
 //! - `formats`: the same scene from several formats
@@ -65,6 +65,7 @@ mod gltf_counts;
 mod gltf_motion;
 mod importance;
 mod kill;
+mod lit_things;
 mod load_assets;
 mod maps;
 mod mishaps;

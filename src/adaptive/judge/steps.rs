@@ -3,7 +3,7 @@
 use super::super::denoised::TimedDenoising;
 use super::super::missed::{Darkness, EdgeProfile, FoundLight, LampEdges};
 use super::super::settings::LoopSettings;
-use super::super::small_lamps::unmet_noise;
+use super::super::small_things::unmet_noise;
 use super::super::statistics::{SampleStatistics, by_channel, scene_units};
 use super::noise_on_display::{NoiseOnDisplay, display_scale, variance_shares};
 use super::{JudgeError, guide_rgb, still_wanted};

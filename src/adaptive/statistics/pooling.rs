@@ -3,7 +3,7 @@
 //! In planes, [`LANES`] columns at a time, whose sums stay in registers and in the first cache.
 
 use super::PixelEvidence;
-use crate::film::{CHANNELS, KnownLamps, PixelGuide};
+use crate::film::{CHANNELS, KnownThings, PixelGuide};
 use fechner_perception::Plane;
 use glam::Vec4;
 use rayon::prelude::*;
@@ -121,8 +121,8 @@ const NOWHERE: f32 = 1e20;
 pub(super) struct PixelSurfaces<'a> {
     /// Of each pixel.
     pub(super) guides: &'a [PixelGuide],
-    /// Small lamps of which few of these samples tell.
-    pub(super) known_lamps: Option<&'a KnownLamps>,
+    /// Small things of which few of these samples tell.
+    pub(super) known_things: Option<&'a KnownThings>,
 }
 
 /// How a pixel counts as a neighbour.
@@ -136,7 +136,7 @@ impl PixelSurfaces<'_> {
         /// How far: such a pixel weighs nothing beside others, however strong its noise.
         const APART: f32 = 1e10;
         let mut looks = looks(&self.guides[pixel]);
-        let share = self.known_lamps.map_or(0.0, |lamps| lamps.share(pixel));
+        let share = self.known_things.map_or(0.0, |things| things.share(pixel));
         if share == 0.0 {
             // Never 0, so that a lone pixel still learns something.
             return AsNeighbour { looks, least_weight: 0.02 };
@@ -342,7 +342,7 @@ mod tests {
     }
 
     fn surfaces(guides: &[PixelGuide]) -> PixelSurfaces<'_> {
-        PixelSurfaces { guides, known_lamps: None }
+        PixelSurfaces { guides, known_things: None }
     }
 
     /// A lamp in the middle of an even sky scatters, which is not the noise of the sky beside it.
@@ -357,10 +357,10 @@ mod tests {
                 [PixelEvidence { variance, squared_difference: 1.0, expected_difference: 1.0 }; CHANNELS]
             })
             .collect();
-        let mut lamps = KnownLamps::new(guides.len());
+        let mut lamps = KnownThings::new(guides.len());
         lamps.add(lamp, 0.1, 1.0, true);
-        let beside = |known_lamps: Option<&KnownLamps>| {
-            let surfaces = PixelSurfaces { guides: &guides, known_lamps };
+        let beside = |known_things: Option<&KnownThings>| {
+            let surfaces = PixelSurfaces { guides: &guides, known_things };
             pooled_by_neighbours(&evidence, &surfaces, SIZE[0])[0].variance.values()[lamp + 1]
         };
         let (unknown, known) = (beside(None), beside(Some(&lamps)));

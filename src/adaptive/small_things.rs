@@ -1,4 +1,4 @@
-//! Samples for pixels in which a lamp smaller than they is known to be, and the noise of those that few samples have met.
+//! Samples for pixels in which a lamp smaller than they is known to be, and the noise of known things that few samples have met.
 //!
 //! Of a lamp that covers a thirtieth of a pixel the first sixteen samples find nothing in six pixels of ten, and their halves agree that it is black.
 //! Where it is, and how much it covers, is known before the first sample, so the count is no matter of luck.
@@ -50,9 +50,9 @@ fn wanted(share: f32, meetings: f64) -> u32 {
     if is_small { (meetings / f64::from(share)).min(MOST_SAMPLES).ceil() as u32 } else { 0 }
 }
 
-/// How wrong each pixel is expected to be seen of which samples have met known lamps fewer than [`MEETINGS`] times: the mean square, (cd/m²)² on
+/// How wrong each pixel is expected to be seen of which samples have met known things fewer than [`MEETINGS`] times: the mean square, (cd/m²)² on
 /// the display, over how often chance lets so many samples meet them (Poisson's distribution). Once they are met oftener, their own scatter
-/// tells. `None` where no lamps are known.
+/// tells. `None` where none are known.
 ///
 /// Of forty lamps far out of focus few neighbours had met one, and renders asked for 8 stopped at 51 to 53 with 46 % of the light missing.
 /// `found`: what is found besides. `shown`: what is displayed of a pixel's luminance, both cd/m².
@@ -62,12 +62,12 @@ pub(super) fn unmet_noise(
     nits_per_unit: f64,
     shown: impl Fn(Pixel, f32) -> f32 + Sync,
 ) -> Option<Plane> {
-    let lamps = film.known_lamps.as_ref()?;
+    let things = film.known_things.as_ref()?;
     let width = film.width() as usize;
     Some(Plane::from_fn(width, film.height() as usize, |x, y| {
         let index = y * width + x;
         let Some(expected_meetings) = few_meetings(film, index) else { return 0.0 };
-        let light = nits_per_unit * f64::from(lamps.light(index));
+        let light = nits_per_unit * f64::from(things.light(index));
         let of_one_meeting = light / expected_meetings;
         let besides = (f64::from(found.mean_cd_m2.values()[index]) - light).max(0.0);
         let shown = |light: f64| f64::from(shown(Pixel { x, y }, (besides + light) as f32));
@@ -77,10 +77,10 @@ pub(super) fn unmet_noise(
     }))
 }
 
-/// How often a pixel's samples are expected to have met its known lamps, where that is fewer than [`MEETINGS`] times; `None` where it has none,
+/// How often a pixel's samples are expected to have met its known things, where that is fewer than [`MEETINGS`] times; `None` where it has none,
 /// or less than [`LEAST_SHARE`].
 pub(super) fn few_meetings(film: &Film, pixel: usize) -> Option<f64> {
-    let share = film.known_lamps.as_ref()?.share(pixel);
+    let share = film.known_things.as_ref()?.share(pixel);
     let expected = f64::from(share) * f64::from(film.samples(pixel));
     (share >= LEAST_SHARE && expected < MEETINGS && expected > 0.0).then_some(expected)
 }
@@ -101,7 +101,7 @@ fn mean_of_poisson(expected: f64, of_count: impl Fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{BlockSum, KnownLamps};
+    use crate::film::{BlockSum, KnownThings};
     use crate::integrator::{BlockWork, FirstHit, PathSample};
     use crate::sampler::Half;
     use glam::Vec3;
@@ -127,9 +127,9 @@ mod tests {
             film.merge_block(BlockWork { samples, ..BlockWork::whole(0, Half::A, 0) }, &sum);
             let found = FoundLight::of_film(&film, 10.0);
             assert!(unmet_noise(&film, &found, 10.0, |_, light| light).is_none(), "no lamps are known");
-            let mut lamps = KnownLamps::new(1);
+            let mut lamps = KnownThings::new(1);
             lamps.add(0, 0.005, 200.0, true);
-            film.known_lamps = Some(lamps);
+            film.known_things = Some(lamps);
             f64::from(unmet_noise(&film, &found, 10.0, |_, light| shown(light)).expect("known").get(0, 0))
         };
         // The variance of a count of 0.08 is 0.08, of which each is 125 cd/m².

@@ -1,11 +1,10 @@
-//! Lamps cut into spots that a camera sees at a moment.
+//! Lamps and other things cut into spots that a camera sees at a moment.
 
 use super::super::Crop;
 use super::super::camera::CameraAt;
-use super::MOST_RAYS;
 use super::strip::Strip;
-use crate::film::opponent;
-use crate::light::{LampPart, LampShape};
+use super::{MOST_RAYS, Part, Shine};
+use crate::geometry::Facet;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -23,7 +22,7 @@ const SPREAD: f32 = 0.25;
 /// What passes by in less than this share of the time that the shutter is open is small.
 const BRIEF: f32 = 0.25;
 
-/// A spot of a lamp.
+/// A spot of something.
 pub(super) struct Spot {
     pub(super) position: Vec3,
     /// In the picture, were it sharp.
@@ -36,8 +35,9 @@ pub(super) struct Spot {
     pub(super) spread_px: Vec2,
     /// How far it would go in the picture while the shutter is open.
     pub(super) velocity_px: Vec2,
-    /// Luminance of what it emits, scene units.
-    pub(super) luminance: f32,
+    /// What is smaller there, in pixels, is met by few samples of any pixel.
+    pub(super) small_px: f32,
+    pub(super) shine: Shine,
 }
 
 impl Spot {
@@ -47,7 +47,7 @@ impl Spot {
     }
 }
 
-/// Lamps cut into spots.
+/// What is cut into spots.
 pub(super) struct Spots<'a> {
     camera: CameraAt<'a>,
     /// The camera a little later.
@@ -72,10 +72,10 @@ impl Around {
         self.blur_px.min_element().max(BRIEF * self.velocity_px.length())
     }
 
-    fn spot(self, position: Vec3, area_px2: f32, radius: f32, luminance: f32) -> Spot {
-        let Self { blur_px, velocity_px } = self;
+    fn spot(self, position: Vec3, area_px2: f32, radius: f32, shine: Shine) -> Spot {
+        let (Self { blur_px, velocity_px }, small_px) = (self, self.small_px());
         let spread_px = (SPREAD * blur_px).max(Vec2::splat((area_px2 / PI).sqrt()));
-        Spot { position, area_px2, radius, blur_px, spread_px, velocity_px, luminance }
+        Spot { position, area_px2, radius, blur_px, spread_px, velocity_px, small_px, shine }
     }
 }
 
@@ -85,21 +85,20 @@ impl<'a> Spots<'a> {
         Self { camera, later, step, area, found: Vec::new() }
     }
 
-    /// Adds what is small of a part of a lamp. `later`: the part as it is when the camera is.
-    pub(super) fn add(&mut self, part: &LampPart, later: &LampPart) {
+    /// Adds what is small of a part. `later`: its middle, when the camera is there.
+    pub(super) fn add(&mut self, Part { facet, front, shine }: &Part, later: Vec3) {
         if self.found.len() >= MOST_RAYS {
             return;
         }
-        let [luminance, ..] = opponent(part.radiance.as_dvec3().to_array()).map(|value| value as f32);
-        let center = part.shape.center();
-        let Some(around) = self.around(center, later.shape.center()) else { return };
-        match part.shape {
-            LampShape::Triangle { corners, front } => {
+        let center = facet.center();
+        let Some(around) = self.around(center, later) else { return };
+        match *facet {
+            Facet::Triangle(corners) => {
                 if front.is_none_or(|front| front.dot(self.camera.way_to(center)) < 0.0) {
-                    self.add_triangle(corners, around, luminance);
+                    self.add_triangle(corners, around, *shine);
                 }
             }
-            LampShape::Sphere { center, radius } => self.add_sphere(center, radius, around, luminance),
+            Facet::Sphere { center, radius } => self.add_sphere(center, radius, around, *shine),
         }
     }
 
@@ -110,7 +109,7 @@ impl<'a> Spots<'a> {
     }
 
     /// A sphere that is smaller than a pixel, or than what is small there, as spots of one size: what is before its middle may hide it in part.
-    fn add_sphere(&mut self, center: Vec3, radius: f32, around: Around, luminance: f32) {
+    fn add_sphere(&mut self, center: Vec3, radius: f32, around: Around, shine: Shine) {
         /// Spots around the one in the middle.
         const AROUND: usize = 6;
         /// How far those are from it, over the radius.
@@ -128,7 +127,7 @@ impl<'a> Spots<'a> {
         let ring = (0..AROUND).map(|number| Vec2::from_angle(TAU * number as f32 / AROUND as f32) * (AWAY * radius));
         for aside in ring.chain([Vec2::ZERO]) {
             let position = center + aside.x * right + aside.y * up;
-            self.found.push(around.spot(position, area_px2, radius, luminance));
+            self.found.push(around.spot(position, area_px2, radius, shine));
         }
     }
 
@@ -146,7 +145,7 @@ impl<'a> Spots<'a> {
 
     /// A triangle that is smaller than what is small there, in slices across its longest side. Nothing of one that is thick, or not wholly before
     /// the camera.
-    fn add_triangle(&mut self, corners: [Vec3; 3], around: Around, luminance: f32) {
+    fn add_triangle(&mut self, corners: [Vec3; 3], around: Around, shine: Shine) {
         let Some(places_px) = each(corners, |corner| self.camera.project(corner)) else { return };
         let small_px = around.small_px();
         let places_px = places_px.map(|place_px| place_px.as_dvec2());
@@ -162,7 +161,7 @@ impl<'a> Spots<'a> {
             if distance.is_finite() && distance > 0.0 {
                 let position = (origin + distance * direction).as_vec3();
                 let here = Around { blur_px: self.camera.blur_px(position), ..around };
-                self.found.push(here.spot(position, slice.area_px2 as f32, 0.0, luminance));
+                self.found.push(here.spot(position, slice.area_px2 as f32, 0.0, shine));
             }
         }
     }

@@ -1,12 +1,12 @@
-//! What pieces of lamps bring to the film's pixels.
+//! What pieces of small things bring to the film's pixels.
 
 use super::super::Crop;
-use crate::film::KnownLamps;
+use crate::film::KnownThings;
 use crate::sampler::FilterDensity;
 use glam::Vec2;
 use std::f64::consts::PI;
 
-/// A piece of a lamp, as a point of the lens sees it at a moment.
+/// A piece of something, as a point of the lens sees it at a moment.
 pub(super) struct Piece {
     /// Its middle.
     pub(super) place_px: Vec2,
@@ -15,21 +15,23 @@ pub(super) struct Piece {
     pub(super) area_px2: f32,
     /// Half axes of the ellipse that its light is spread over, where they are at least a pixel.
     pub(super) spread_px: Vec2,
-    /// Scene units.
+    /// Of it, or by how much that is unlike what is around it; scene units.
     pub(super) luminance: f32,
+    /// Whether its pixels are to have samples for it whatever it looks like.
+    pub(super) is_urgent: bool,
 }
 
 /// Shares of the film's pixels.
 pub(super) struct Shares {
     area: Crop,
     density: FilterDensity,
-    pub(super) lamps: KnownLamps,
+    pub(super) things: KnownThings,
 }
 
 impl Shares {
     /// None yet.
     pub(super) fn new(area: Crop, density: FilterDensity) -> Self {
-        Self { area, density, lamps: KnownLamps::new(area.width as usize * area.height as usize) }
+        Self { area, density, things: KnownThings::new(area.pixels()) }
     }
 
     /// Adds a piece to each pixel whose samples may meet it, at steps of its way that are no longer than a pixel.
@@ -71,7 +73,7 @@ impl Shares {
         for (x, y) in (-1..=1).flat_map(|y| (-1..=1).map(move |x| (x, y))) {
             let pixel = own + Vec2::new(x as f32, y as f32);
             let density = density_at(pixel);
-            self.add_share(pixel, piece.area_px2 * density, piece.luminance, density >= MUCH * most);
+            self.add_share(pixel, piece.area_px2 * density, piece.luminance, piece.is_urgent && density >= MUCH * most);
         }
     }
 
@@ -85,15 +87,15 @@ impl Shares {
         let all = (0..rows).flat_map(|y| (0..columns).map(move |x| low + Vec2::new(x as f32, y as f32)));
         let is_in = |pixel: &Vec2| ((*pixel + 0.5 - place_px) / spread_px).length_squared() <= 1.0;
         let share = (f64::from(piece.area_px2) / ellipse_px2(spread_px)) as f32;
-        all.filter(is_in).for_each(|pixel| self.add_share(pixel, share, piece.luminance, true));
+        all.filter(is_in).for_each(|pixel| self.add_share(pixel, share, piece.luminance, piece.is_urgent));
     }
 
-    fn add_share(&mut self, pixel: Vec2, share: f32, luminance: f32, is_main: bool) {
+    fn add_share(&mut self, pixel: Vec2, share: f32, luminance: f32, is_urgent: bool) {
         let (column, row) = (pixel.x - self.area.x as f32, pixel.y - self.area.y as f32);
         let is_inside =
             (0.0..self.area.width as f32).contains(&column) && (0.0..self.area.height as f32).contains(&row);
         if is_inside {
-            self.lamps.add(row as usize * self.area.width as usize + column as usize, share, luminance, is_main);
+            self.things.add(row as usize * self.area.width as usize + column as usize, share, luminance, is_urgent);
         }
     }
 }

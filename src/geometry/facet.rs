@@ -1,0 +1,27 @@
+//! One piece of a surface in the world.
+
+use glam::Vec3;
+
+/// A triangle or a sphere, where a ray would meet it.
+#[derive(Clone, Copy, Debug)]
+pub enum Facet {
+    /// A triangle, by its corners.
+    Triangle([Vec3; 3]),
+    /// A sphere.
+    Sphere {
+        /// Its centre.
+        center: Vec3,
+        /// Its radius.
+        radius: f32,
+    },
+}
+
+impl Facet {
+    /// Its middle.
+    pub fn center(&self) -> Vec3 {
+        match self {
+            Self::Triangle(corners) => corners.iter().sum::<Vec3>() / 3.0,
+            Self::Sphere { center, .. } => *center,
+        }
+    }
+}
