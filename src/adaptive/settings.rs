@@ -2,7 +2,7 @@
 
 use super::pursuit::Pursuit;
 use crate::denoise::Denoiser;
-use crate::integrator::PILOT_SAMPLES_A_PIXEL;
+use crate::integrator::{PILOT_SAMPLES_A_PIXEL, TraceSettings};
 use crate::sampler::PixelFilter;
 use fechner_perception::Plane;
 use fechner_perception::csf::FrameTiming;
@@ -146,8 +146,8 @@ pub struct LoopSettings {
 }
 
 impl LoopSettings {
-    /// The default loop, to visibility 1.
-    pub fn new(viewing: Viewing, nits_per_unit: f64, operator: Box<dyn ToneOperator>) -> Self {
+    /// The default loop, to visibility 1, over samples that are traced so.
+    pub fn new(trace: &TraceSettings, viewing: Viewing, nits_per_unit: f64, operator: Box<dyn ToneOperator>) -> Self {
         Self {
             sampling: Sampling::Adaptive,
             allocation: AllocationRule::Convex,
@@ -161,9 +161,9 @@ impl LoopSettings {
             importance: None,
             gazes: Vec::new(),
             pursuit: None,
-            filter: PixelFilter::default(),
+            filter: trace.filter,
             denoiser: None,
-            is_transparent: false,
+            is_transparent: trace.transparent,
             is_outdated: None,
         }
     }

@@ -119,8 +119,12 @@ impl Subject {
     }
 
     pub(crate) fn tracer(&self, seed: u64) -> PathTracer {
-        let settings = TraceSettings::new(self.size.0, self.size.1, seed);
-        PathTracer::new(Arc::clone(&self.scene), settings)
+        PathTracer::new(Arc::clone(&self.scene), self.trace_settings(seed))
+    }
+
+    /// How every arm traces.
+    fn trace_settings(&self, seed: u64) -> TraceSettings {
+        TraceSettings::new(self.size.0, self.size.1, seed)
     }
 
     /// Settings of the default loop, to be changed by an arm.
@@ -128,7 +132,7 @@ impl Subject {
         let operator = tone_operator(&self.scene)?;
         Ok(LoopSettings {
             limits: Limits::of_visibility(self.visibility),
-            ..LoopSettings::new(self.viewing.clone(), self.scene.nits_per_unit, operator)
+            ..LoopSettings::new(&self.trace_settings(0), self.viewing.clone(), self.scene.nits_per_unit, operator)
         })
     }
 

@@ -5,7 +5,6 @@ use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
 use crate::denoise::{Denoiser, DenoiserKind, OidnError};
 use crate::integrator::{Crop, TraceSettings};
 use crate::output::PartOf;
-use crate::sampler::PixelFilter;
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use fechner_perception::csf::FrameTiming;
@@ -224,12 +223,12 @@ impl SettingsRecord {
         }
     }
 
-    /// Settings for the loop over samples that were traced by a filter, less the importance map, of which only the hash is here; the
+    /// Settings for the loop over samples that were traced so, less the importance map, of which only the hash is here; the
     /// denoiser is opened.
     ///
     /// # Errors
     /// For names that nobody answers to, and denoisers that are not installed.
-    pub fn loop_settings(&self, limits: Limits, filter: PixelFilter) -> Result<LoopSettings, SettingsError> {
+    pub fn loop_settings(&self, limits: Limits, trace: &TraceSettings) -> Result<LoopSettings, SettingsError> {
         let operator = tone::operator(&self.operator, self.exposure_stops).ok_or_else(|| UnknownName {
             kind: "tone operator",
             name: self.operator.clone(),
@@ -241,11 +240,10 @@ impl SettingsRecord {
             model: self.threshold_model()?,
             denoiser: self.denoiser.map(Denoiser::open).transpose()?,
             limits,
-            filter,
             fitted: self.fitted.clone(),
             frames: self.frames,
             gazes: self.gazes.clone(),
-            ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)
+            ..LoopSettings::new(trace, self.viewing.clone(), self.nits_per_unit, operator)
         })
     }
 

@@ -226,8 +226,7 @@ impl JobArguments {
         let Crop { width, height, .. } = trace.film_area();
         check_memory(Size { width, height })?;
         let mut record = settings_record(self, &scene)?;
-        let mut settings = record.loop_settings(limits(self, &scene, record.sampling), trace.filter)?;
-        settings.is_transparent = trace.transparent;
+        let mut settings = record.loop_settings(limits(self, &scene, record.sampling), &trace)?;
         if let Some(path) = &self.importance {
             if matches!(settings.sampling, Sampling::Rival(_)) {
                 bail!("--importance multiplies thresholds, and this --sampling has none: use adaptive or uniform");

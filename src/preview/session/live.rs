@@ -72,8 +72,7 @@ pub(super) fn settings_of(job: &Job, live: &Live, whole: Option<&SceneLight>) ->
         return Err(format!("exposure must be from -{MOST_EXPOSURE_STOPS} to {MOST_EXPOSURE_STOPS} stops"));
     }
     let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..job.limits };
-    let mut settings = record.loop_settings(limits, job.trace.filter).map_err(|error| error.to_string())?;
-    settings.is_transparent = job.trace.transparent;
+    let mut settings = record.loop_settings(limits, &job.trace).map_err(|error| error.to_string())?;
     if let Some(whole) = whole {
         settings.fit_to(whole);
     }

@@ -137,6 +137,7 @@ pub(in crate::preview) fn in_words(reason: StopReason) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrator::TraceSettings;
     use fechner_perception::display::Viewing;
     use fechner_perception::tone::operator;
 
@@ -144,7 +145,12 @@ mod tests {
     #[test]
     fn the_first_look_says_when_it_comes() {
         let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
-        let settings = LoopSettings::new(viewing, 100.0, operator("constant", None).expect("an operator"));
+        let settings = LoopSettings::new(
+            &TraceSettings::new(1, 1, 1),
+            viewing,
+            100.0,
+            operator("constant", None).expect("an operator"),
+        );
         let mut status =
             blank_status(&Scene::default(), &settings, "constant", &Held::at_home(&Scene::default().camera));
         (status.width, status.height) = (10, 10);
