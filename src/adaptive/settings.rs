@@ -24,6 +24,16 @@ pub enum Sampling {
     Rival(RivalRule),
 }
 
+impl Sampling {
+    /// Whether it looks at the picture as an eye would, if only to know when it is done.
+    pub fn is_by_sight(self) -> bool {
+        match self {
+            Self::Adaptive | Self::Uniform => true,
+            Self::Rival(_) => false,
+        }
+    }
+}
+
 /// Stop rules and budgets of today's renderers (see [`super::rivals`]).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum RivalRule {
@@ -69,7 +79,7 @@ pub struct Limits {
     pub max_samples: u32,
     /// Number of plans, to repeat a render that ended by time.
     pub plans: Option<u32>,
-    /// Samples of every pixel before the first look, or as many as the other limits allow where these are fewer.
+    /// Samples of every pixel before the first look where the other limits allow as many: [`Self::pilot`] is what they come to.
     pub pilot_samples: u32,
 }
 
@@ -91,6 +101,11 @@ impl Limits {
     /// What a visibility as [`Self::last_rung`] states it aims at.
     pub fn visibility_of_last_rung(rung: f64) -> Option<f64> {
         (rung > 0.0 && rung.is_finite()).then_some(rung)
+    }
+
+    /// Samples of every pixel before the first look: [`Self::pilot_samples`], or what the other limits leave of them.
+    pub fn pilot(&self) -> u32 {
+        self.pilot_samples.min(self.max_samples).min(self.mean_samples.unwrap_or(u32::MAX))
     }
 
     /// To a visibility, whatever it takes.

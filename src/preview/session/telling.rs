@@ -2,7 +2,7 @@
 
 use super::Session;
 use crate::adaptive::settings::LoopSettings;
-use crate::adaptive::state::{RenderState, pilot_samples};
+use crate::adaptive::state::RenderState;
 use crate::adaptive::{Progress, StopReason, visible_share};
 use crate::preview::command::{Phase, Status};
 use crate::preview::orbit::Held;
@@ -64,7 +64,7 @@ pub(in crate::preview) fn blank_status(scene: &Scene, settings: &LoopSettings, o
         samples_a_second: 0.0,
         seconds: 0.0,
         seconds_left: None,
-        pilot_samples: pilot_samples(&settings.limits),
+        pilot_samples: settings.limits.pilot(),
         visible_share: None,
         target: settings.limits.last_rung(),
         rung: None,
