@@ -109,6 +109,16 @@ pub trait ToneOperator: Send + Sync + Debug {
         false
     }
 
+    /// Whether [`ToneSettings::scope`] changes what it shows.
+    fn knows_places(&self) -> bool {
+        false
+    }
+
+    /// Which of [`ToneSettings::effects`] it can show and leave out.
+    fn optional_effects(&self) -> Effects {
+        Effects::default()
+    }
+
     /// Whether it looks at what the rods see of the guide ([`SceneGuide::scotopic_cd_m2`]).
     fn sees_rods(&self) -> bool {
         false

@@ -65,6 +65,26 @@ fn check_fit(name: &str, fitted: &dyn FittedTone, pixel: Pixel) {
     }
 }
 
+/// Operators of different settings differ in their `Debug` form.
+#[test]
+fn every_operator_says_which_settings_change_it() {
+    for name in operator_names() {
+        let with = |settings: ToneSettings| format!("{:?}", operator_with(name, &settings).unwrap());
+        let operator = operator(name, None).unwrap();
+        let local = ToneSettings { scope: AdaptationScope::Local, ..ToneSettings::default() };
+        assert_eq!(operator.knows_places(), with(local) != with(ToneSettings::default()), "{name}");
+        let with = |effects| with(ToneSettings { effects: Some(effects), ..ToneSettings::default() });
+        let nothing = Effects::default();
+        let knows = |effect| with(effect) != with(nothing);
+        let known = Effects {
+            glare: knows(Effects { glare: true, ..nothing }),
+            acuity: knows(Effects { acuity: true, ..nothing }),
+            colour: knows(Effects { colour: true, ..nothing }),
+        };
+        assert_eq!(operator.optional_effects(), known, "{name}");
+    }
+}
+
 #[test]
 fn black_is_black_to_every_operator_that_has_no_veil() {
     let guide = Plane::from_fn(64, 64, |x, y| (x * y) as f32 * 0.1);
