@@ -8,7 +8,7 @@ use crate::cli::maps::check_map;
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
 use crate::cli::seeing::tone_operator;
 use crate::cli::targets::check_kept;
-use crate::cli::words::count;
+use crate::cli::words::{OF_THE_MODEL, count};
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::animate::spread_over;
@@ -303,19 +303,12 @@ impl<'a> Sequences<'a> {
             visible_fraction: mean(|seen| seen.visible_fraction),
             ..worst.seen
         };
+        let operator = match &self.showing {
+            Showing::AsRendered => Some("of each frame, as it was rendered".to_owned()),
+            Showing::By(fitted) => fitted.as_ref().map(|fitted| fitted.describe()),
+        };
         let figures = SequenceFigures {
-            all: Figures {
-                reference: self.arguments.reference.display().to_string(),
-                test: self.arguments.test.display().to_string(),
-                display: self.viewing.display.name.clone(),
-                pixels_per_degree: self.viewing.display.pixels_per_degree,
-                csf: csf::DEFAULT,
-                operator: match &self.showing {
-                    Showing::AsRendered => Some("of each frame, as it was rendered".to_owned()),
-                    Showing::By(fitted) => fitted.as_ref().map(|fitted| fitted.describe()),
-                },
-                seen,
-            },
+            all: Figures::of(self.arguments, &self.viewing, csf::DEFAULT, operator, seen),
             frames_per_second: self.viewing.display.frames_per_second,
             eye_follows: self.velocity.is_some(),
             worst_frame: worst.frame,
@@ -326,8 +319,7 @@ impl<'a> Sequences<'a> {
         }
         answer!(
             "{}: worst visibility {:.2} in frame {} (seen in a 1° patch with {:.1} %), {:.2} % of {} above threshold, \
-             on \"{}\" at {} pixels a degree and {} frames a second, by an eye that {} (model-predicted; calibrated on \
-             gratings, not on renderings)",
+             on \"{}\" at {} pixels a degree and {} frames a second, by an eye that {} ({OF_THE_MODEL})",
             if seen.is_visible { "visible in motion" } else { "the same to the eye in motion" },
             seen.worst_visibility,
             figures.worst_frame,
