@@ -11,7 +11,7 @@ use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
 use fechner_perception::eccentricity::Gaze;
 use fechner_perception::model::{self, ThresholdModel};
-use fechner_perception::tone::{self, SavedTone};
+use fechner_perception::tone::{self, SavedTone, ToneSettings};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -156,19 +156,10 @@ pub struct SettingsRecord {
 pub enum SettingsError {
     /// A name that nobody answers to.
     #[error(transparent)]
-    Name(#[from] UnknownName),
+    Name(#[from] fechner_perception::Error),
     /// The denoiser is not on this machine.
     #[error(transparent)]
     Denoiser(#[from] OidnError),
-}
-
-/// A name that this version does not know.
-#[derive(Debug, thiserror::Error)]
-#[error("there is no {kind} \"{name}\"; known: {known}")]
-pub struct UnknownName {
-    kind: &'static str,
-    name: String,
-    known: String,
 }
 
 impl Seeds {
@@ -229,11 +220,9 @@ impl SettingsRecord {
     /// # Errors
     /// For names that nobody answers to, and denoisers that are not installed.
     pub fn loop_settings(&self, limits: Limits, trace: &TraceSettings) -> Result<LoopSettings, SettingsError> {
-        let operator = tone::operator(&self.operator, self.exposure_stops).ok_or_else(|| UnknownName {
-            kind: "tone operator",
-            name: self.operator.clone(),
-            known: tone::operator_names().join(", "),
-        })?;
+        let exposure_stops = self.exposure_stops.unwrap_or_default();
+        let tone = ToneSettings { exposure_stops, ..ToneSettings::default() };
+        let operator = tone::operator_named(&self.operator, &tone)?;
         Ok(LoopSettings {
             sampling: self.sampling,
             allocation: self.allocation,
@@ -248,12 +237,8 @@ impl SettingsRecord {
     }
 
     /// `None` for the default, which the loop itself pools over the eye's window.
-    fn threshold_model(&self) -> Result<Option<Box<dyn ThresholdModel>>, UnknownName> {
-        let found = model::by_name(&self.model).ok_or_else(|| UnknownName {
-            kind: "threshold model",
-            name: self.model.clone(),
-            known: model::names().join(", "),
-        })?;
+    fn threshold_model(&self) -> Result<Option<Box<dyn ThresholdModel>>, fechner_perception::Error> {
+        let found = model::named(&self.model)?;
         Ok(Some(found).filter(|_| self.model != model::DEFAULT))
     }
 

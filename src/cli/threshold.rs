@@ -139,9 +139,7 @@ impl Asked {
         let viewing = viewing(arguments, &named, velocity.as_ref().map(|(_, exr)| exr))?;
         let display = output::display_attribute(&viewing.display);
         let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
-        let model = model::by_name(&arguments.model).with_context(|| {
-            format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
-        })?;
+        let model = model::named(&arguments.model)?;
         arguments.seeing.note_what_is_idle(model.as_ref());
         let made_of = halves.as_ref().map_or(MadeOf::Else, |halves| MadeOf::of(&guide, halves));
         if let Some(told) = made_of.told().filter(|_| model.name() == model::DEFAULT) {

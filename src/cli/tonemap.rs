@@ -179,7 +179,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     if operator == "all" {
         return run_all(arguments, format, &targets, &viewing, &settings);
     }
-    let operator = seeing::tone_operator(operator, &settings)?;
+    let operator = tone::operator_named(operator, &settings)?;
     check_settings(operator.as_ref(), &settings)?;
     if arguments.gaze.is_some() && !operator.sees_adaptation() {
         bail!("--gaze: {} shows the same wherever the eye looks", operator.name());

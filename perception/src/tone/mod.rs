@@ -58,7 +58,9 @@ pub use durand_dorsey00::DurandDorsey00;
 pub use ferwerda96::Ferwerda96;
 pub use field::AdaptationScope;
 pub use guide::{Pixel, SceneGuide};
-pub use names::{DEFAULT_OPERATOR, Effects, ToneSettings, operator, operator_initials, operator_names, operator_with};
+pub use names::{
+    DEFAULT_OPERATOR, Effects, ToneSettings, operator, operator_initials, operator_named, operator_names, operator_with,
+};
 pub use pattanaik00::Pattanaik00;
 pub use pbr_neutral::PbrNeutral;
 pub use picture::{map_picture, map_pixels};

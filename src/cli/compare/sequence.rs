@@ -6,7 +6,6 @@ use crate::cli::json::write_json;
 use crate::cli::kept_tone::{as_rendered, first_scene};
 use crate::cli::maps::check_map;
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
-use crate::cli::seeing::tone_operator;
 use crate::cli::targets::check_kept;
 use crate::cli::words::{OF_THE_MODEL, count};
 use anyhow::{Context, Result, bail};
@@ -17,7 +16,7 @@ use fechner_perception::csf;
 use fechner_perception::display::Viewing;
 use fechner_perception::sequence::{FrameMotion, SequenceFrame, SequenceObserver};
 use fechner_perception::tone::{
-    AdaptationState, DEFAULT_OPERATOR, FittedTone, Goal, SceneLight, ToneOperator, ToneSettings,
+    AdaptationState, DEFAULT_OPERATOR, FittedTone, Goal, SceneLight, ToneOperator, ToneSettings, operator_named,
 };
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -230,7 +229,7 @@ impl<'a> Sequences<'a> {
         let showing = if asked.is_none() && as_rendered(&firsts, &viewing).is_some() {
             Showing::AsRendered
         } else {
-            let operator = tone_operator(asked.unwrap_or(DEFAULT_OPERATOR), &ToneSettings::default())?;
+            let operator = operator_named(asked.unwrap_or(DEFAULT_OPERATOR), &ToneSettings::default())?;
             // One exposure for the whole sequence, as a viewer would hold it.
             let fit_to = |name: &FrameName| fit(operator.as_ref(), name, numbers, nits_per_unit, &viewing);
             Showing::By(match fit_to(&reference)? {
@@ -357,7 +356,7 @@ mod tests {
             write_exr(&name.of(frame), &picture).expect("written");
         }
         let shown = |operator: &str| {
-            let operator = tone_operator(operator, &ToneSettings::default()).expect("an operator");
+            let operator = operator_named(operator, &ToneSettings::default()).expect("an operator");
             let fitted = fit(operator.as_ref(), &name, &[1, 2, 3, 4], None, &Viewing::default()).expect("read");
             fitted.expect("scene light").relative_luminance(1.0)
         };
