@@ -118,7 +118,8 @@ fn rendered(scene: &Arc<Scene>, sequence: Sequence, seed: u64, effort: Effort) -
     let viewing = Viewing::of(Display::preset("desktop").context("a preset")?);
     let operator = operator("constant", None).context("an operator")?;
     let limits = Limits { visibility, mean_samples, ..Limits::of_visibility(THRESHOLD) };
-    let settings = LoopSettings { sampling, limits, ..LoopSettings::new(viewing, scene.nits_per_unit, operator) };
     let trace = TraceSettings { sequence, ..TraceSettings::new(SIZE, SIZE, seed) };
+    let settings =
+        LoopSettings { sampling, limits, ..LoopSettings::new(&trace, viewing, scene.nits_per_unit, operator) };
     Ok(render(&PathTracer::new(Arc::clone(scene), trace), &settings, &Quiet)?)
 }

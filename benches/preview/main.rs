@@ -140,7 +140,10 @@ impl Subject {
 
     fn loop_settings(&self, limits: Limits) -> Result<LoopSettings> {
         let operator = operator("constant", None).context("an operator")?;
-        Ok(LoopSettings { limits, ..LoopSettings::new(self.viewing.clone(), self.scene.nits_per_unit, operator) })
+        Ok(LoopSettings {
+            limits,
+            ..LoopSettings::new(&self.trace_settings(0), self.viewing.clone(), self.scene.nits_per_unit, operator)
+        })
     }
 
     fn pixels(&self) -> usize {

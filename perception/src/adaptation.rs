@@ -18,29 +18,6 @@ pub enum Mean {
     Geometric,
 }
 
-/// The luminance, cd/m², that an eye looking all over the picture adapts to, at least 1e-4. 1e-4 for a picture without pixels;
-/// values that are not finite are left out.
-#[must_use]
-pub fn world_adaptation_cd_m2(luminance_cd_m2: &Plane, mean: Mean) -> f64 {
-    let floor = f64::from(LEAST_ADAPTATION_CD_M2);
-    let (mut sum, mut count) = (0.0, 0.0);
-    for &value in luminance_cd_m2.values().iter().filter(|value| value.is_finite()) {
-        let value = f64::from(value.max(LEAST_ADAPTATION_CD_M2));
-        sum += match mean {
-            Mean::Arithmetic => value,
-            Mean::Geometric => value.ln(),
-        };
-        count += 1.0;
-    }
-    if count == 0.0 {
-        return floor;
-    }
-    match mean {
-        Mean::Arithmetic => (sum / count).max(floor),
-        Mean::Geometric => (sum / count).exp().max(floor),
-    }
-}
-
 /// The luminance, cd/m², that the eye looking at each pixel adapts to: the mean over a Gaussian of σ 0.25° (as wide as a
 /// disc of 1°), at least 1e-4. Arithmetic means first bring down pixels that outshine all their neighbours, or all but one:
 /// fireflies, alone or in pairs.
@@ -136,8 +113,6 @@ mod tests {
     #[test]
     fn half_dark_half_bright() {
         let picture = Plane::from_fn(40, 40, |x, _| if x < 20 { 1.0 } else { 100.0 });
-        assert!((world_adaptation_cd_m2(&picture, Mean::Arithmetic) - 50.5).abs() < 1e-6);
-        assert!((world_adaptation_cd_m2(&picture, Mean::Geometric) - 10.0).abs() < 1e-6);
         // At the edge the window sees as much of one half as of the other.
         let at = |mean| {
             let adapted = local_adaptation_cd_m2(&picture, &display(20.0), mean).unwrap();
@@ -150,12 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn black_and_empty_pictures_adapt_to_the_floor() {
-        for picture in [Plane::filled(0, 0, 1.0), Plane::filled(3, 3, 0.0), Plane::filled(2, 2, f32::NAN)] {
-            for mean in [Mean::Arithmetic, Mean::Geometric] {
-                assert!((world_adaptation_cd_m2(&picture, mean) - 1e-4).abs() < 1e-9);
-            }
-        }
+    fn an_impossible_display_is_refused() {
         assert!(local_adaptation_cd_m2(&Plane::filled(2, 2, 1.0), &display(0.0), Mean::Geometric).is_err());
     }
 }

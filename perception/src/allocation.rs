@@ -104,6 +104,20 @@ const FARTHEST: f64 = 20.7;
 /// Share of the budget that counts as all of it.
 const LEAST_SPENT: f64 = 0.99;
 
+/// Visibilities that the search tries at most. Eight doubled steps cross all that there are; the others are for brackets. A search that is
+/// not done then ends with the best that it has.
+const MOST_ROUNDS: u32 = 40;
+
+/// Width of a bracket of log visibility at which the search ends though less than [`LEAST_SPENT`] of the budget is spent: cost goes as v⁻²,
+/// so that 0.02 % of it is left to be found, and what jumps within is limits.
+const NARROWEST_BRACKET: f64 = 1e-4;
+
+/// Share of a bracket that goes in every round at least, wherever the aim is.
+const LEAST_CUT: f64 = 0.1;
+
+/// Share by which rounding may bring the sum of the fewest counts over the cheapest cost.
+const ROUNDING: f64 = 1e-9;
+
 /// Finds the lowest visibility that `budget` (Σ cᵢ nᵢ) can pay for, and the counts for it; `problem.visibility` is where
 /// the search begins.
 ///
@@ -121,7 +135,7 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
     let (mut too_dear, mut affordable) = (f64::NEG_INFINITY, f64::INFINITY);
     let mut best: Option<Allocation> = None;
     let mut least_step = LEAST_STEP;
-    for _ in 0..40 {
+    for _ in 0..MOST_ROUNDS {
         let found = solver.solve(visibility, &mut multipliers);
         let excess = found.cost / budget;
         if excess <= 1.0 {
@@ -135,7 +149,7 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
             }
         } else {
             too_dear = visibility.ln();
-            if best.is_none() && found.cost <= solver.cheapest * (1.0 + 1e-9) {
+            if best.is_none() && found.cost <= solver.cheapest * (1.0 + ROUNDING) {
                 // Not even the fewest samples are affordable: they are the answer.
                 best = Some(found);
                 break;
@@ -144,11 +158,10 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
         // Without limits cost goes as v⁻²; aim amid what is enough.
         let aimed = visibility.ln() + 0.5 * (excess / (0.5 * (LEAST_SPENT + 1.0))).ln();
         let next = if too_dear.is_finite() && affordable.is_finite() {
-            if affordable - too_dear < 1e-4 {
+            if affordable - too_dear < NARROWEST_BRACKET {
                 break;
             }
-            // Of every bracket a tenth goes at least.
-            let margin = 0.1 * (affordable - too_dear);
+            let margin = LEAST_CUT * (affordable - too_dear);
             aimed.clamp(too_dear + margin, affordable - margin)
         } else {
             // Limits make the cost respond less than the law says, and far from the answer not at all: ever greater steps.

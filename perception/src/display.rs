@@ -98,6 +98,14 @@ impl Display {
         PRESETS.iter().find(|preset| preset.name == name).map(Self::from_preset)
     }
 
+    /// [`Display::preset`], for names that somebody has given.
+    ///
+    /// # Errors
+    /// [`Error::UnknownName`], which lists those that there are.
+    pub fn named(name: &str) -> Result<Self, Error> {
+        Self::preset(name).ok_or_else(|| Error::unknown_name("display preset", name, Self::preset_names()))
+    }
+
     /// The names that [`Display::preset`] knows.
     #[must_use]
     pub fn preset_names() -> &'static [&'static str] {

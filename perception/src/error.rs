@@ -80,6 +80,13 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// That nothing of a kind has this name.
+    pub(crate) fn unknown_name(kind: &'static str, name: &str, known: &[&str]) -> Self {
+        Self::UnknownName { kind, name: name.to_owned(), known: known.join(", ") }
+    }
+}
+
 /// A number in words, of few digits however large it is.
 fn brief(value: f64) -> String {
     if value == 0.0 || (1e-5..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }

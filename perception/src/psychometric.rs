@@ -17,20 +17,6 @@ pub fn detection_probability(v: f64) -> f64 {
     -(-v.abs().powf(SLOPE)).exp_m1()
 }
 
-/// The visibility at which an error is seen with probability `probability`: the inverse of
-/// [`detection_probability`]. Values outside [0, 1) give 0 or infinity.
-#[must_use]
-pub fn visibility_at_probability(probability: f64) -> f64 {
-    (-(-probability.clamp(0.0, 1.0)).ln_1p()).powf(SLOPE.recip())
-}
-
-/// Probability that at least one of several independent patches is noticed: 1 − Π(1 − p), which for this function is
-/// 1 − exp(−Σ|v|^3.5).
-#[must_use]
-pub fn probability_of_any(visibilities: impl IntoIterator<Item = f64>) -> f64 {
-    -(-visibilities.into_iter().map(|v| v.abs().powf(SLOPE)).sum::<f64>()).exp_m1()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -45,16 +31,8 @@ mod tests {
             (2.0, 0.999_987_795_5),
         ] {
             assert!((detection_probability(v) / expected - 1.0).abs() < 1e-9, "v = {v}");
-            assert!((visibility_at_probability(expected) / v - 1.0).abs() < 1e-6, "v = {v}");
         }
         assert!((detection_probability(0.900_578) - 0.5).abs() < 1e-6);
         assert_eq!(detection_probability(-1.5), detection_probability(1.5));
-    }
-
-    #[test]
-    fn probability_summation_is_minkowski_pooling() {
-        let parts = [0.4, 0.9, 0.2];
-        let product: f64 = parts.iter().map(|&v| 1.0 - detection_probability(v)).product();
-        assert!((probability_of_any(parts) - (1.0 - product)).abs() < 1e-12);
     }
 }

@@ -78,17 +78,6 @@ pub fn saliency(inputs: &SaliencyInputs<'_>) -> Result<Plane, Error> {
     Ok(resized(&small, pyramid.octave(COMMON), Level { octave: 0, width, height }))
 }
 
-/// Gaze at one point instead of a saliency map: 1 at (`x_px`, `y_px`), falling as a Gaussian of `sigma_px`.
-#[must_use]
-pub fn gaze(width: usize, height: usize, x_px: f32, y_px: f32, sigma_px: f32) -> Plane {
-    let scale = -0.5 / (sigma_px * sigma_px).max(1e-6);
-    Plane::from_fn(width, height, |x, y| {
-        let (dx, dy) = (x as f32 + 0.5 - x_px, y as f32 + 0.5 - y_px);
-        let value = ((dx * dx + dy * dy) * scale).exp();
-        if value.is_finite() { value } else { 0.0 }
-    })
-}
-
 /// Centre scales and the surrounds' distance from them, as published.
 const CENTERS: [usize; 3] = [2, 3, 4];
 const DELTAS: [usize; 2] = [3, 4];
@@ -441,11 +430,5 @@ mod tests {
         }
         let bad = Plane::filled(3, 3, f32::NAN);
         assert!(saliency(&SaliencyInputs { rgb: [&bad; 3], velocity: None }).is_err());
-    }
-
-    #[test]
-    fn gaze_is_where_it_is_put() {
-        let map = gaze(100, 50, 30.0, 20.0, 10.0);
-        assert!(map.get(29, 19) > 0.99 && map.get(99, 49) < 1e-6);
     }
 }

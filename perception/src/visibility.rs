@@ -23,6 +23,14 @@ pub struct MeasuredError {
     pub amplitude: Plane,
 }
 
+/// An error as filters show it.
+struct PooledError {
+    /// At every pixel of the picture; infinite where the error is no number.
+    visibility: Plane,
+    /// Σ_b `V_b`² at every pixel of the filters' field, from which that is pooled.
+    energy: Plane,
+}
+
 impl ThresholdMap {
     /// Visibility that independent pixel errors of this variance ((cd/m²)² on the display, of the pixel's mean) will
     /// have, on average over noise.
@@ -75,36 +83,34 @@ impl ThresholdMap {
     /// Pixels that are not finite get infinity and count as 0 for the others; a plane of another size gets infinity everywhere.
     #[must_use]
     pub fn measured_visibility(&self, half_difference: &Plane) -> Plane {
-        if !self.fits(half_difference) {
-            return self.infinite();
-        }
-        let mut filters = ErrorFilters::new(self);
-        let energy = filters.energy(half_difference);
-        infinite_where_unknown(filters.visibility_of(&energy), half_difference)
+        self.pooled_error(ErrorFilters::new(self), half_difference)
+            .map_or_else(|| self.infinite(), |error| error.visibility)
     }
 
     /// [`ThresholdMap::measured_visibility`] of a difference that ends with the pictures (see [`ErrorFilters::amid_equals`]).
     pub(crate) fn visibility_amid_equals(&self, difference: &Plane) -> Plane {
-        if !self.fits(difference) {
-            return self.infinite();
-        }
-        let mut filters = ErrorFilters::amid_equals(self);
-        let energy = filters.energy(difference);
-        infinite_where_unknown(filters.visibility_of(&energy), difference)
+        self.pooled_error(ErrorFilters::amid_equals(self), difference)
+            .map_or_else(|| self.infinite(), |error| error.visibility)
     }
 
     /// [`ThresholdMap::measured_visibility`], and the unpooled amplitude beside it.
     #[must_use]
     pub fn measured_error(&self, half_difference: &Plane) -> MeasuredError {
-        if !self.fits(half_difference) {
-            return MeasuredError { visibility: self.infinite(), amplitude: self.infinite() };
+        match self.pooled_error(ErrorFilters::new(self), half_difference) {
+            None => MeasuredError { visibility: self.infinite(), amplitude: self.infinite() },
+            Some(PooledError { visibility, energy }) => {
+                MeasuredError { visibility, amplitude: infinite_where_unknown(energy.map(f32::sqrt), half_difference) }
+            }
         }
-        let mut filters = ErrorFilters::new(self);
-        let energy = filters.energy(half_difference);
-        MeasuredError {
-            visibility: infinite_where_unknown(filters.visibility_of(&energy), half_difference),
-            amplitude: infinite_where_unknown(energy.map(f32::sqrt), half_difference),
+    }
+
+    /// What filters make of an error; `None` for one of another size.
+    fn pooled_error(&self, mut filters: ErrorFilters<'_>, error: &Plane) -> Option<PooledError> {
+        if !self.fits(error) {
+            return None;
         }
+        let energy = filters.energy(error);
+        Some(PooledError { visibility: infinite_where_unknown(filters.visibility_of(&energy), error), energy })
     }
 
     /// `plane` convolved with the pooling window g, a Gaussian of σ 0.25° (any unit, unchanged).

@@ -2,7 +2,7 @@
 
 use fechner_perception::photometry::{luminance, scotopic_luminance};
 use fechner_perception::tone::{
-    AdaptationScope, FittedTone, Pixel, SceneGuide, ToneSettings, map_picture, operator_names, operator_with,
+    AdaptationScope, FittedTone, Pixel, SceneGuide, ToneSettings, map_picture, operator_named, operator_names,
 };
 use fechner_perception::{Plane, display, seen};
 use numpy::{PyArray2, PyArray3};
@@ -10,8 +10,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{Pixels, Shape, plane, plane_to_array, rgb_to_array};
-use crate::errors::{check_size, work};
-use crate::viewing::{Viewing, or_default, unknown};
+use crate::errors::{check_size, value_error, work};
+use crate::viewing::{Viewing, or_default};
 
 /// The names of the tone operators.
 #[pyfunction]
@@ -46,7 +46,7 @@ pub(crate) fn fit_tone(
 ) -> PyResult<Tone> {
     let scope = if local { AdaptationScope::Local } else { AdaptationScope::World };
     let settings = ToneSettings { exposure_stops, scope, effects: None };
-    let operator = operator_with(name, &settings).ok_or_else(|| unknown("tone operator", name, operator_names()))?;
+    let operator = operator_named(name, &settings).map_err(value_error)?;
     if !(-100.0..=100.0).contains(&exposure_stops) {
         return Err(PyValueError::new_err(format!(
             "exposure_stops is {exposure_stops}; it must be between -100 and 100"

@@ -1,7 +1,6 @@
 //! Displays, observers, and who looks at what.
 
-use fechner_perception::display::Glare;
-use fechner_perception::{Error, display};
+use fechner_perception::display::{self, Glare};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -170,12 +169,7 @@ fn display_or_preset(given: &Bound<'_, PyAny>) -> PyResult<display::Display> {
 }
 
 fn named_display(name: &str) -> PyResult<display::Display> {
-    display::Display::preset(name).ok_or_else(|| unknown("display preset", name, display::Display::preset_names()))
-}
-
-/// That `name` is nothing, and what there is.
-pub(crate) fn unknown(kind: &'static str, name: &str, known: &[&str]) -> PyErr {
-    value_error(Error::UnknownName { kind, name: name.to_owned(), known: known.join(", ") })
+    display::Display::named(name).map_err(value_error)
 }
 
 /// The eye: sensitivity (1 is the median observer, 1.75 a keen one), csf_area_deg2 (area of the grating whose threshold is

@@ -39,7 +39,7 @@ use awake::with_threads_awake;
 use judge::{JudgeError, Judgement, judge, judge_to_plan};
 use plan::slices;
 use progress::progress;
-use settings::{LoopSettings, Sampling};
+use settings::LoopSettings;
 use state::{RenderState, Seconds};
 use std::cell::OnceCell;
 use std::collections::VecDeque;
@@ -363,7 +363,7 @@ impl<'a> Loop<'a> {
 
     /// Looks once more where the rule did not need to.
     fn last_judgement(&mut self, judgement: Judgement) -> Result<Judgement, JudgeError> {
-        if !matches!(self.settings.sampling, Sampling::Rival(_)) || self.is_looked_at() {
+        if self.settings.sampling.is_by_sight() || self.is_looked_at() {
             return Ok(judgement);
         }
         let last = self.look(judge)?;

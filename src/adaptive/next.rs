@@ -44,8 +44,7 @@ impl Loop<'_> {
         let limits = &self.settings.limits;
         let left = self.left_of_budget();
         if left == 0 {
-            let is_by_sight = !matches!(self.settings.sampling, Sampling::Rival(_));
-            let is_there = is_by_sight && is_reached(judgement, limits.last_rung());
+            let is_there = self.settings.sampling.is_by_sight() && is_reached(judgement, limits.last_rung());
             return Ok(Step::Stop(if is_there { StopReason::Visibility } else { StopReason::Samples }));
         }
         if let Sampling::Rival(rule) = self.settings.sampling {
@@ -67,7 +66,7 @@ impl Loop<'_> {
         }
         while let Some(&rung) = self.rungs.front() {
             if let Some(plan) = self.plan_towards(rung, judgement, left)? {
-                if let Some(plan) = some(cut(plan, &self.state.film, judgement, left)) {
+                if let Some(plan) = cut(plan, &self.state.film, judgement, left).non_empty() {
                     return Ok(Step::Trace(plan));
                 }
                 is_spent = true;
@@ -100,7 +99,7 @@ impl Loop<'_> {
             self.enter(even_plan(&self.state.film, left, self.settings.limits.max_samples));
             return Ok(true);
         }
-        if self.settings.denoiser.is_none() || matches!(self.settings.sampling, Sampling::Rival(_)) || left == 0 {
+        if self.settings.denoiser.is_none() || !self.settings.sampling.is_by_sight() || left == 0 {
             return Ok(false);
         }
         let started = Instant::now();
@@ -129,7 +128,7 @@ impl Loop<'_> {
         Ok(true)
     }
 
-    /// Samples that pixels should have to meet lamps smaller than they, for sampling by sight.
+    /// Samples that pixels should have to meet lamps smaller than they, for adaptive sampling.
     fn samples_to_meet_lamps(&self) -> Option<&[u32]> {
         if self.settings.sampling != Sampling::Adaptive {
             return None;
@@ -143,12 +142,12 @@ impl Loop<'_> {
 
     fn plan_to_meet_small_things(&self, left: u64) -> Option<SamplePlan> {
         let wanted = self.samples_to_meet_lamps()?;
-        some(plan_up_to(&self.state.film, |pixel| wanted[pixel])).filter(|plan| plan.samples() <= left)
+        plan_up_to(&self.state.film, |pixel| wanted[pixel]).non_empty().filter(|plan| plan.samples() <= left)
     }
 
     /// Samples before the first look: the pilot's, and those for lamps smaller than a pixel.
     fn first_samples(&self) -> u64 {
-        let pilot = u64::from(self.settings.limits.pilot_samples);
+        let pilot = u64::from(self.settings.limits.pilot());
         match self.samples_to_meet_lamps() {
             Some(wanted) => wanted.iter().map(|&wanted| u64::from(wanted).max(pilot)).sum(),
             None => pilot * self.state.film.pixel_count() as u64,
@@ -162,8 +161,8 @@ impl Loop<'_> {
         const WORTH_A_LOOK: f64 = 4.0 * SAMPLES_OF_A_RAW_LOOK;
         let (film, limits) = (&self.state.film, &self.settings.limits);
         let pixels = film.pixel_count() as u64;
-        let is_by_sight = self.settings.denoiser.is_none() && !matches!(self.settings.sampling, Sampling::Rival(_));
-        is_by_sight
+        self.settings.denoiser.is_none()
+            && self.settings.sampling.is_by_sight()
             && left > 0
             && left as f64 <= WORTH_A_LOOK * pixels as f64
             && film.total_samples() == self.first_samples()
@@ -176,7 +175,7 @@ impl Loop<'_> {
         let (film, limits) = (&self.state.film, &self.settings.limits);
         let most = limits.mean_samples.unwrap_or(limits.max_samples).min(limits.max_samples);
         let pixels = film.pixel_count() as u64;
-        (2 * (film.total_samples() / pixels).max(u64::from(limits.pilot_samples) / 2) as u32).min(most)
+        (2 * (film.total_samples() / pixels) as u32).max(limits.pilot()).min(most)
     }
 
     /// More samples for a rung; `None` when it is reached or no pixel may have more. `left`: of the budget. An audit may make
@@ -190,13 +189,13 @@ impl Loop<'_> {
         loop {
             if !is_reached(judgement, rung) {
                 still_wanted(self.settings)?;
-                return Ok(some(self.unreached(rung, judgement, left)?));
+                return Ok(self.unreached(rung, judgement, left)?.non_empty());
             }
             if self.settings.sampling == Sampling::Uniform || rung > HIGHEST_AUDITED_RUNG {
                 return Ok(None);
             }
             still_wanted(self.settings)?;
-            if let Some(plan) = some(self.peaks(rung, judgement)) {
+            if let Some(plan) = self.peaks(rung, judgement).non_empty() {
                 return Ok(Some(plan));
             }
             match self.audited(rung, judgement)? {
@@ -288,10 +287,6 @@ impl Loop<'_> {
 /// Whether a rung needs, nearly everywhere, so much more than is there that the next plan does not depend on where the way ends.
 fn is_far(judgement: &Judgement, rung: f64) -> bool {
     judgement.predicted.quantile(ELSEWHERE).powi(2) > FAR * rung * rung
-}
-
-fn some(plan: SamplePlan) -> Option<SamplePlan> {
-    if plan.blocks.is_empty() { None } else { Some(plan) }
 }
 
 /// Share of display white that one scene unit makes near black: the exposure that other renderers are told.

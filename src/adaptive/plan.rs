@@ -122,7 +122,7 @@ pub(super) fn wanted_samples(
     visibility: f64,
     limits: &Limits,
 ) -> Result<Wanted, fechner_perception::Error> {
-    let least = f64::from(limits.pilot_samples);
+    let least = f64::from(limits.pilot());
     let most = f64::from(limits.max_samples).max(least);
     let variance = &judgement.pooled_variance_per_sample;
     if rule == AllocationRule::Convex && judgement.thresholds.per_pixel.is_none() {

@@ -2,7 +2,7 @@
 
 use super::pursuit::Pursuit;
 use crate::denoise::Denoiser;
-use crate::integrator::PILOT_SAMPLES_A_PIXEL;
+use crate::integrator::{PILOT_SAMPLES_A_PIXEL, TraceSettings};
 use crate::sampler::PixelFilter;
 use fechner_perception::Plane;
 use fechner_perception::csf::FrameTiming;
@@ -22,6 +22,16 @@ pub enum Sampling {
     Uniform,
     /// By another renderer's rule, for comparison.
     Rival(RivalRule),
+}
+
+impl Sampling {
+    /// Whether it looks at the picture as an eye would, if only to know when it is done.
+    pub fn is_by_sight(self) -> bool {
+        match self {
+            Self::Adaptive | Self::Uniform => true,
+            Self::Rival(_) => false,
+        }
+    }
 }
 
 /// Stop rules and budgets of today's renderers (see [`super::rivals`]).
@@ -69,7 +79,7 @@ pub struct Limits {
     pub max_samples: u32,
     /// Number of plans, to repeat a render that ended by time.
     pub plans: Option<u32>,
-    /// Samples of every pixel before the first look, or as many as the other limits allow where these are fewer.
+    /// Samples of every pixel before the first look where the other limits allow as many: [`Self::pilot`] is what they come to.
     pub pilot_samples: u32,
 }
 
@@ -91,6 +101,11 @@ impl Limits {
     /// What a visibility as [`Self::last_rung`] states it aims at.
     pub fn visibility_of_last_rung(rung: f64) -> Option<f64> {
         (rung > 0.0 && rung.is_finite()).then_some(rung)
+    }
+
+    /// Samples of every pixel before the first look: [`Self::pilot_samples`], or what the other limits leave of them.
+    pub fn pilot(&self) -> u32 {
+        self.pilot_samples.min(self.max_samples).min(self.mean_samples.unwrap_or(u32::MAX))
     }
 
     /// To a visibility, whatever it takes.
@@ -146,8 +161,8 @@ pub struct LoopSettings {
 }
 
 impl LoopSettings {
-    /// The default loop, to visibility 1.
-    pub fn new(viewing: Viewing, nits_per_unit: f64, operator: Box<dyn ToneOperator>) -> Self {
+    /// The default loop, to visibility 1, over samples that are traced so.
+    pub fn new(trace: &TraceSettings, viewing: Viewing, nits_per_unit: f64, operator: Box<dyn ToneOperator>) -> Self {
         Self {
             sampling: Sampling::Adaptive,
             allocation: AllocationRule::Convex,
@@ -161,9 +176,9 @@ impl LoopSettings {
             importance: None,
             gazes: Vec::new(),
             pursuit: None,
-            filter: PixelFilter::default(),
+            filter: trace.filter,
             denoiser: None,
-            is_transparent: false,
+            is_transparent: trace.transparent,
             is_outdated: None,
         }
     }

@@ -84,13 +84,13 @@ pub struct Exposure {
 impl RenderState {
     /// The start of a render: nothing traced, the pilot planned.
     pub fn new(width: u32, height: u32, limits: &Limits) -> Self {
-        Self::of_film(Film::new(width, height), pilot_samples(limits))
+        Self::of_film(Film::new(width, height), limits.pilot())
     }
 
     /// To go on under other settings.
     #[must_use]
     pub fn begun_anew(self, limits: &Limits) -> Self {
-        self.undecided(pilot_samples(limits))
+        self.undecided(limits.pilot())
     }
 
     /// Its samples, what they took and what audits found, less what was decided. Planned is as in [`Self::of_film`].
@@ -103,10 +103,9 @@ impl RenderState {
     /// A film about which nothing has been decided: empty, merged from others, or made for other eyes. Planned is what it
     /// lacks of a pilot of 8 + 8 samples a pixel, or of `most_samples` in all.
     pub fn of_film(film: Film, most_samples: u32) -> Self {
-        let pilot = pilot_plan(&film, most_samples);
         Self {
+            pending: pilot_plan(&film, most_samples).non_empty().into_iter().collect(),
             film,
-            pending: if pilot.blocks.is_empty() { VecDeque::new() } else { VecDeque::from([pilot]) },
             traced_blocks: 0,
             finished_rung: None,
             left_rung: None,
@@ -129,8 +128,8 @@ impl RenderState {
         if self.is_planned_within(limits) {
             return self;
         }
-        let pilot = if self.plans == 0 { pilot_plan(&self.film, pilot_samples(limits)) } else { SamplePlan::default() };
-        let pending = if pilot.blocks.is_empty() { VecDeque::new() } else { VecDeque::from([pilot]) };
+        let pilot = if self.plans == 0 { pilot_plan(&self.film, limits.pilot()).non_empty() } else { None };
+        let pending = pilot.into_iter().collect();
         Self { pending, traced_blocks: 0, ..self }
     }
 
@@ -171,9 +170,4 @@ impl RenderState {
     pub fn untraced_samples(&self) -> u64 {
         self.untraced_blocks().map(|block| u64::from(block.samples)).sum()
     }
-}
-
-/// Samples of every pixel before the first look.
-pub(crate) fn pilot_samples(limits: &Limits) -> u32 {
-    limits.pilot_samples.min(limits.max_samples).min(limits.mean_samples.unwrap_or(u32::MAX))
 }

@@ -2,19 +2,27 @@
 
 use super::settings::LoopSettings;
 use crate::film::{Film, film_of_samples};
-use crate::integrator::{FirstHit, PILOT_SAMPLES_A_HALF, PathSample};
+use crate::integrator::{FirstHit, PILOT_SAMPLES_A_HALF, PathSample, TraceSettings};
 use crate::sampler::{Half, hash_words, unit_of_hash};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::operator;
 use glam::Vec3;
 
+/// Pixels along a film's edge.
+const SIDE: u32 = 64;
+
 /// An absolute operator on a desktop display.
 pub(super) fn settings() -> LoopSettings {
     let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
-    LoopSettings::new(viewing, 100.0, operator("absolute", None).expect("an operator"))
+    LoopSettings::new(
+        &TraceSettings::new(SIDE, SIDE, 1),
+        viewing,
+        100.0,
+        operator("absolute", None).expect("an operator"),
+    )
 }
 
-/// A pilot at 64×64 of `color(pixel, random in −1..1)`.
+/// A pilot, square, of `color(pixel, random in −1..1)`.
 pub(super) fn film_of(color: impl Fn(u32, f32) -> Vec3) -> Film {
     film_of_lamps(color, |_| false)
 }
@@ -30,7 +38,7 @@ pub(super) fn film_of_halves(
     shines: impl Fn(u32) -> bool,
     color: impl Fn(u32, Half, f32) -> Vec3,
 ) -> Film {
-    film_of_samples([64, 64], samples, |pixel, half, index| {
+    film_of_samples([SIDE, SIDE], samples, |pixel, half, index| {
         let key = u64::from(pixel) << 8 | u64::from(index);
         let random = 2.0 * unit_of_hash(hash_words(key, half.index() as u64)) - 1.0;
         let first_hit = FirstHit { shines: shines(pixel), ..FirstHit::WALL };

@@ -76,7 +76,8 @@ impl Needs {
             seconds += started.elapsed().as_secs_f64();
             samples += film.total_samples();
             let judgement = judge(&film, &settings, 1.0)?;
-            let limits = Limits { pilot_samples: PILOT_SAMPLES_A_PIXEL, ..shot.limits };
+            // What frames need is asked to know how the budget is shared, so that it limits none of them.
+            let limits = Limits { pilot_samples: PILOT_SAMPLES_A_PIXEL, mean_samples: None, ..shot.limits };
             let mut ln_samples = [0.0; ASKED.len()];
             for (ln_samples, visibility) in ln_samples.iter_mut().zip(ASKED) {
                 let needed = needed_samples(&film, &judgement, visibility, &limits);

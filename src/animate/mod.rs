@@ -107,10 +107,9 @@ impl ShotSettings {
             gazes: gazes.unwrap_or_default(),
             limits: Limits { mean_samples: track.mean_samples.or(self.limits.mean_samples), ..self.limits },
             denoiser: self.denoiser.clone(),
-            filter: self.trace.filter,
             fitted: Some(track.fitted.clone()),
             frames: if self.pausable { None } else { Some(timing) },
-            ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)
+            ..LoopSettings::new(&self.trace, self.viewing.clone(), self.nits_per_unit, operator)
         }
     }
 

@@ -14,6 +14,7 @@ use super::{BenchSettings, Subject, check_inputs, make_folders};
 use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, LoopSettings, RivalRule, Sampling};
 use crate::adaptive::{Quiet, render};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
+use crate::integrator::PILOT_SAMPLES_A_PIXEL;
 use anyhow::Result;
 use fechner_perception::Plane;
 use fechner_perception::denoised::VISIBLY_WRONG;
@@ -25,6 +26,13 @@ use std::time::Instant;
 const TILE: usize = 16;
 /// Budgets, mean samples a pixel.
 const BUDGETS: [u32; 7] = [4, 8, 16, 32, 64, 128, 256];
+/// What a rule that ends by its own threshold may take, as a multiple of the budget that the threshold is made for: scenes that need more
+/// for it than others are to end by the rule all the same.
+const ROOM_OF_A_RIVAL: u32 = 8;
+/// Cycles' measure of a single sample's noise, about: what 16 samples a pixel leave is 0.1, and it falls as the root of the count.
+const RELATIVE_NOISE_OF_ONE_SAMPLE: f64 = 0.4;
+/// The visibility that our rule is told to aim at in a race: so low that it is the budget that ends it.
+const OUT_OF_REACH: f64 = 0.01;
 /// Budgets whose pictures the law is held against.
 const JUDGED: [u32; 4] = [4, 16, 64, 256];
 
@@ -222,13 +230,12 @@ impl SceneBench<'_> {
                 settings.limits.pilot_samples = spp;
             }
             RaceRule::Relative => {
-                // Its noise falls as the root of the count; what 16 samples a pixel leave is about 0.1.
-                let threshold = 0.4 / f64::from(spp).sqrt();
+                let threshold = RELATIVE_NOISE_OF_ONE_SAMPLE / f64::from(spp).sqrt();
                 settings.sampling = Sampling::Rival(RivalRule::Relative { threshold });
-                settings.limits.mean_samples = Some(8 * spp);
-                settings.limits.pilot_samples = 16;
+                settings.limits.mean_samples = Some(ROOM_OF_A_RIVAL * spp);
+                settings.limits.pilot_samples = PILOT_SAMPLES_A_PIXEL;
             }
-            RaceRule::Visible => settings.limits.visibility = Some(0.01),
+            RaceRule::Visible => settings.limits.visibility = Some(OUT_OF_REACH),
         }
         let rendered = render(&self.subject.tracer(seed), &settings, &Quiet)?;
         let metrics = self.measured(rendered.judgement.picture())?;

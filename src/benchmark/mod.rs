@@ -47,7 +47,7 @@ use crate::scene::Scene;
 use crate::scene::load::{LoadOptions, load};
 use anyhow::{Context, Result};
 use fechner_perception::display::{Display, Viewing};
-use fechner_perception::tone::{self, ToneOperator};
+use fechner_perception::tone::{self, ToneOperator, ToneSettings};
 use name::distinct_names;
 use oracle::{displayed_variance, least_mean_samples, uniform_samples};
 use reference::Reference;
@@ -85,15 +85,14 @@ pub const COVERAGES: [f64; 3] = [0.95, MAIN_COVERAGE, 0.999];
 
 /// How a display preset is looked at.
 fn viewing(display: &str) -> Result<Viewing> {
-    let known = || format!("there is no display \"{display}\"; known: {}", Display::preset_names().join(", "));
-    Ok(Viewing::of(Display::preset(display).with_context(known)?))
+    Ok(Viewing::of(Display::named(display)?))
 }
 
 /// The operator that shows a scene, as the scene asks for it.
 fn tone_operator(scene: &Scene) -> Result<Box<dyn ToneOperator>> {
     let name = scene.viewing.operator.as_deref().unwrap_or(tone::DEFAULT_OPERATOR);
-    tone::operator(name, scene.viewing.exposure_stops)
-        .with_context(|| format!("there is no tone operator \"{name}\"; known: {}", tone::operator_names().join(", ")))
+    let exposure_stops = scene.viewing.exposure_stops.unwrap_or_default();
+    Ok(tone::operator_named(name, &ToneSettings { exposure_stops, ..ToneSettings::default() })?)
 }
 
 /// One scene, ready to be rendered by any arm.
@@ -119,8 +118,12 @@ impl Subject {
     }
 
     pub(crate) fn tracer(&self, seed: u64) -> PathTracer {
-        let settings = TraceSettings::new(self.size.0, self.size.1, seed);
-        PathTracer::new(Arc::clone(&self.scene), settings)
+        PathTracer::new(Arc::clone(&self.scene), self.trace_settings(seed))
+    }
+
+    /// How every arm traces.
+    fn trace_settings(&self, seed: u64) -> TraceSettings {
+        TraceSettings::new(self.size.0, self.size.1, seed)
     }
 
     /// Settings of the default loop, to be changed by an arm.
@@ -128,7 +131,7 @@ impl Subject {
         let operator = tone_operator(&self.scene)?;
         Ok(LoopSettings {
             limits: Limits::of_visibility(self.visibility),
-            ..LoopSettings::new(self.viewing.clone(), self.scene.nits_per_unit, operator)
+            ..LoopSettings::new(&self.trace_settings(0), self.viewing.clone(), self.scene.nits_per_unit, operator)
         })
     }
 

@@ -5,14 +5,13 @@ use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
 use crate::denoise::{Denoiser, DenoiserKind, OidnError};
 use crate::integrator::{Crop, TraceSettings};
 use crate::output::PartOf;
-use crate::sampler::PixelFilter;
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
 use fechner_perception::eccentricity::Gaze;
 use fechner_perception::model::{self, ThresholdModel};
-use fechner_perception::tone::{self, SavedTone};
+use fechner_perception::tone::{self, SavedTone, ToneSettings};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -157,19 +156,10 @@ pub struct SettingsRecord {
 pub enum SettingsError {
     /// A name that nobody answers to.
     #[error(transparent)]
-    Name(#[from] UnknownName),
+    Name(#[from] fechner_perception::Error),
     /// The denoiser is not on this machine.
     #[error(transparent)]
     Denoiser(#[from] OidnError),
-}
-
-/// A name that this version does not know.
-#[derive(Debug, thiserror::Error)]
-#[error("there is no {kind} \"{name}\"; known: {known}")]
-pub struct UnknownName {
-    kind: &'static str,
-    name: String,
-    known: String,
 }
 
 impl Seeds {
@@ -224,38 +214,31 @@ impl SettingsRecord {
         }
     }
 
-    /// Settings for the loop over samples that were traced by a filter, less the importance map, of which only the hash is here; the
+    /// Settings for the loop over samples that were traced so, less the importance map, of which only the hash is here; the
     /// denoiser is opened.
     ///
     /// # Errors
     /// For names that nobody answers to, and denoisers that are not installed.
-    pub fn loop_settings(&self, limits: Limits, filter: PixelFilter) -> Result<LoopSettings, SettingsError> {
-        let operator = tone::operator(&self.operator, self.exposure_stops).ok_or_else(|| UnknownName {
-            kind: "tone operator",
-            name: self.operator.clone(),
-            known: tone::operator_names().join(", "),
-        })?;
+    pub fn loop_settings(&self, limits: Limits, trace: &TraceSettings) -> Result<LoopSettings, SettingsError> {
+        let exposure_stops = self.exposure_stops.unwrap_or_default();
+        let tone = ToneSettings { exposure_stops, ..ToneSettings::default() };
+        let operator = tone::operator_named(&self.operator, &tone)?;
         Ok(LoopSettings {
             sampling: self.sampling,
             allocation: self.allocation,
             model: self.threshold_model()?,
             denoiser: self.denoiser.map(Denoiser::open).transpose()?,
             limits,
-            filter,
             fitted: self.fitted.clone(),
             frames: self.frames,
             gazes: self.gazes.clone(),
-            ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)
+            ..LoopSettings::new(trace, self.viewing.clone(), self.nits_per_unit, operator)
         })
     }
 
     /// `None` for the default, which the loop itself pools over the eye's window.
-    fn threshold_model(&self) -> Result<Option<Box<dyn ThresholdModel>>, UnknownName> {
-        let found = model::by_name(&self.model).ok_or_else(|| UnknownName {
-            kind: "threshold model",
-            name: self.model.clone(),
-            known: model::names().join(", "),
-        })?;
+    fn threshold_model(&self) -> Result<Option<Box<dyn ThresholdModel>>, fechner_perception::Error> {
+        let found = model::named(&self.model)?;
         Ok(Some(found).filter(|_| self.model != model::DEFAULT))
     }
 

@@ -11,7 +11,7 @@ mod tracing;
 pub use file::{
     CheckpointError, decode_checkpoint, is_checkpoint, read_checkpoint, read_header, seal, write_checkpoint,
 };
-pub use header::{Header, Origin, PROGRAM, Seeds, SettingsError, SettingsRecord, UnknownName};
+pub use header::{Header, Origin, PROGRAM, Seeds, SettingsError, SettingsRecord};
 pub use merge::{MergeError, merge_files};
 pub use tracing::Tracing;
 

@@ -9,6 +9,7 @@ use super::maps::check_map;
 use super::picture::{Ground, InputPicture, Shape, Source};
 use super::seeing::{SeeingArguments, operator_values};
 use super::targets::check_kept;
+use super::words::OF_THE_MODEL;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::adaptive::settings::THRESHOLD;
@@ -65,6 +66,26 @@ struct Figures {
     operator: Option<String>,
     #[serde(flatten)]
     seen: Seen,
+}
+
+impl Figures {
+    fn of(
+        arguments: &CompareArguments,
+        viewing: &Viewing,
+        csf: &'static str,
+        operator: Option<String>,
+        seen: Seen,
+    ) -> Self {
+        Self {
+            reference: arguments.reference.display().to_string(),
+            test: arguments.test.display().to_string(),
+            display: viewing.display.name.clone(),
+            pixels_per_degree: viewing.display.pixels_per_degree,
+            csf,
+            operator,
+            seen,
+        }
+    }
 }
 
 /// What is seen of a difference.
@@ -177,23 +198,15 @@ impl<'a> Compared<'a> {
     }
 
     fn figures(&self, difference: &Difference) -> Figures {
-        let Self { arguments, viewing, .. } = self;
-        Figures {
-            reference: arguments.reference.display().to_string(),
-            test: arguments.test.display().to_string(),
-            display: viewing.display.name.clone(),
-            pixels_per_degree: viewing.display.pixels_per_degree,
-            csf: self.csf.name(),
-            operator: self.fitted.as_ref().map(|fitted| fitted.describe()),
-            seen: Seen::of(difference),
-        }
+        let operator = self.fitted.as_ref().map(|fitted| fitted.describe());
+        Figures::of(self.arguments, &self.viewing, self.csf.name(), operator, Seen::of(difference))
     }
 }
 
 fn tell(figures: &Figures) {
     answer!(
         "{}: worst visibility {:.2} (seen in a 1° patch with {:.1} %), {:.2} % of the picture above threshold, on \
-         \"{}\" at {} pixels a degree (model-predicted; calibrated on gratings, not on renderings)",
+         \"{}\" at {} pixels a degree ({OF_THE_MODEL})",
         if figures.seen.is_visible { "visible" } else { "the same to the eye" },
         figures.seen.worst_visibility,
         100.0 * figures.seen.detection_probability_worst,

@@ -21,7 +21,7 @@ use anyhow::bail;
 use choices::{AllocationChoice, FilterChoice, PruneChoice, SamplingChoice, SequenceChoice, check_crop, parse_crop};
 use clap::Args;
 use fechner::adaptive::glimpse::steady_glimpse;
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, LoopSettings, RivalRule, Sampling};
+use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, LoopSettings, RivalRule};
 use fechner::checkpoint::SettingsRecord;
 use fechner::film::Film;
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, Pruning, TraceSettings};
@@ -226,10 +226,9 @@ impl JobArguments {
         let Crop { width, height, .. } = trace.film_area();
         check_memory(Size { width, height })?;
         let mut record = settings_record(self, &scene)?;
-        let mut settings = record.loop_settings(limits(self, &scene, record.sampling), trace.filter)?;
-        settings.is_transparent = trace.transparent;
+        let mut settings = record.loop_settings(limits(self, &scene, record.sampling), &trace)?;
         if let Some(path) = &self.importance {
-            if matches!(settings.sampling, Sampling::Rival(_)) {
+            if !settings.sampling.is_by_sight() {
                 bail!("--importance multiplies thresholds, and this --sampling has none: use adaptive or uniform");
             }
             let map = importance::read(path, (size.width as usize, size.height as usize), trace.film_area())?;

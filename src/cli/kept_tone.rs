@@ -2,7 +2,6 @@
 //! the render judged, with its operator and its exposure.
 
 use super::picture::InputPicture;
-use super::seeing::tone_operator;
 use anyhow::Result;
 use fechner::exr_read::ExrImage;
 use fechner::output::{Attribute, attribute};
@@ -153,6 +152,6 @@ pub(super) fn shown_by(
     {
         return Ok(Some(fitted));
     }
-    let operator = tone_operator(asked.unwrap_or(DEFAULT_OPERATOR), &ToneSettings::default())?;
+    let operator = tone::operator_named(asked.unwrap_or(DEFAULT_OPERATOR), &ToneSettings::default())?;
     Ok(first_scene(pictures).and_then(|(_, picture)| picture.fit(operator.as_ref(), viewing)))
 }

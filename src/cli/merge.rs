@@ -62,8 +62,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     let tracing = *merged.header.origin.tracing.settings();
     let background = if tracing.transparent { Background::Transparent } else { Background::Shown };
     let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..Limits::of_visibility(THRESHOLD) };
-    let mut settings = merged.header.settings.loop_settings(limits, tracing.filter)?;
-    settings.is_transparent = tracing.transparent;
+    let settings = merged.header.settings.loop_settings(limits, &tracing)?;
     if format.is_none() {
         write_checkpoint(&arguments.output, &merged.header, &merged.state)?;
     }

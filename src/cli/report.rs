@@ -245,8 +245,6 @@ impl Report {
             (attribute::CSF, text(self.csf)),
             ("fechner.eye", text(&self.eye)),
             (attribute::OPERATOR, text(&self.operator)),
-            ("fechner.seen", text("display")),
-            ("fechner.latitude_stops", Attribute::Float(0.0)),
             (attribute::OBSERVER_DISPLAY, text(&self.observer.display)),
             (attribute::OBSERVER_PIXELS_PER_DEGREE, number(self.observer.pixels_per_degree)),
             (attribute::OBSERVER_WHITE_CD_M2, number(self.observer.white_cd_m2)),

@@ -13,7 +13,7 @@ use fechner::scene::load::count_as_read;
 use fechner_perception::csf;
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::model::{self, ThresholdModel};
-use fechner_perception::tone::{self, DEFAULT_OPERATOR, ToneOperator, ToneSettings};
+use fechner_perception::tone::{self, DEFAULT_OPERATOR};
 use std::path::Path;
 
 /// The display where none is named.
@@ -159,23 +159,14 @@ pub(super) fn display_help(default: &str) -> String {
 }
 
 fn find_display(name: &str) -> Result<Display> {
-    if let Some(display) = Display::preset(name) {
-        return Ok(display);
-    }
-    if !name.ends_with(".toml") {
-        bail!("there is no display \"{name}\"; known: {}, or a .toml file", Display::preset_names().join(", "));
+    match Display::named(name) {
+        Err(_) if name.ends_with(".toml") => {}
+        Err(unknown) => bail!("{unknown}, or a .toml file"),
+        Ok(display) => return Ok(display),
     }
     let text = read_file::text(Path::new(name)).with_context(|| format!("display file {name}"))?;
     count_as_read(Path::new(name));
     Display::from_toml(&text).with_context(|| format!("display file {name}"))
-}
-
-/// The tone operator of that name, or an error that lists those that there are.
-pub(super) fn tone_operator(name: &str, settings: &ToneSettings) -> Result<Box<dyn ToneOperator>> {
-    tone::operator_with(name, settings).with_context(|| {
-        let known = tone::operator_names().join(", ");
-        format!("there is no tone operator \"{name}\"; known: {known}")
-    })
 }
 
 /// Names of threshold models.

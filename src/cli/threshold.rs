@@ -12,6 +12,7 @@ use super::kept_tone::shown_by;
 use super::picture::{BEFORE_BLACK, InputPicture, Source, note};
 use super::seeing::{SeeingArguments, model_values, operator_values};
 use super::targets::check_kept;
+use super::words::OF_THE_MODEL;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::exr_read::ExrImage;
@@ -74,7 +75,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let found = asked.judge()?;
     output::write_exr(&arguments.output, &asked.picture_of(&found))?;
     answer!(
-        "median threshold {:.3} cd/m² of standard error at visibility 1 (model-predicted; calibrated on gratings, not on renderings)",
+        "median threshold {:.3} cd/m² of standard error at visibility 1 ({OF_THE_MODEL})",
         median(&found.threshold_cd_m2)
     );
     if let Some(visibility) = &found.visibility {
@@ -138,9 +139,7 @@ impl Asked {
         let viewing = viewing(arguments, &named, velocity.as_ref().map(|(_, exr)| exr))?;
         let display = output::display_attribute(&viewing.display);
         let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
-        let model = model::by_name(&arguments.model).with_context(|| {
-            format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
-        })?;
+        let model = model::named(&arguments.model)?;
         arguments.seeing.note_what_is_idle(model.as_ref());
         let made_of = halves.as_ref().map_or(MadeOf::Else, |halves| MadeOf::of(&guide, halves));
         if let Some(told) = made_of.told().filter(|_| model.name() == model::DEFAULT) {

@@ -179,7 +179,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     if operator == "all" {
         return run_all(arguments, format, &targets, &viewing, &settings);
     }
-    let operator = seeing::tone_operator(operator, &settings)?;
+    let operator = tone::operator_named(operator, &settings)?;
     check_settings(operator.as_ref(), &settings)?;
     if arguments.gaze.is_some() && !operator.sees_adaptation() {
         bail!("--gaze: {} shows the same wherever the eye looks", operator.name());
@@ -227,16 +227,35 @@ fn is_timed(arguments: &TonemapArguments) -> bool {
     arguments.input.len() > 1 || arguments.adapted_to.is_some() || arguments.state.is_some()
 }
 
+/// Whether something is asked for that only an operator could do.
+fn asks_an_operator(arguments: &TonemapArguments) -> bool {
+    // Without dots, so that a new argument has to be thought of.
+    let TonemapArguments {
+        input: _,
+        output: _,
+        operator: _,
+        exposure,
+        nits_per_unit: _,
+        display: _,
+        adaptation,
+        effects,
+        fps,
+        adapted_to,
+        state,
+        gaze,
+    } = arguments;
+    *exposure != 0.0
+        || *adaptation == Scope::Local
+        || effects.is_some()
+        || fps.is_some()
+        || adapted_to.is_some()
+        || state.is_some()
+        || gaze.is_some()
+}
+
 /// Each picture by the operator that it was rendered for.
 fn run_as_rendered(arguments: &TonemapArguments, format: Format, targets: &[PathBuf]) -> Result<()> {
-    let is_asked_more = arguments.exposure != 0.0
-        || arguments.adaptation == Scope::Local
-        || arguments.effects.is_some()
-        || arguments.fps.is_some()
-        || arguments.adapted_to.is_some()
-        || arguments.state.is_some()
-        || arguments.gaze.is_some();
-    if is_asked_more {
+    if asks_an_operator(arguments) {
         bail!("exposure, adaptation, effects, eyes and their time are an operator's: name it by --operator");
     }
     for (input, target) in arguments.input.iter().zip(targets) {
@@ -305,29 +324,21 @@ fn settings(arguments: &TonemapArguments) -> Result<ToneSettings> {
 /// Refuses what changes nothing of an operator.
 fn check_settings(operator: &dyn ToneOperator, settings: &ToneSettings) -> Result<()> {
     let name = operator.name();
-    // Operators of different settings differ in their Debug form.
-    let with = |settings: ToneSettings| tone::operator_with(name, &settings).map(|operator| format!("{operator:?}"));
-    let is_known = |settings: ToneSettings| with(settings) != with(ToneSettings::default());
-    if settings.scope == AdaptationScope::Local
-        && !is_known(ToneSettings { scope: settings.scope, ..ToneSettings::default() })
-    {
+    if settings.scope == AdaptationScope::Local && !operator.knows_places() {
         bail!("--adaptation local: {name} knows no places");
     }
     let Some(chosen) = settings.effects else { return Ok(()) };
-    let nothing = Effects::default();
-    let knows = |effect: Effects| {
-        let with = |effects| with(ToneSettings { effects: Some(effects), ..ToneSettings::default() });
-        with(effect) != with(nothing)
-    };
+    let known = operator.optional_effects();
     let effects = [
-        ("glare", chosen.glare, Effects { glare: true, ..nothing }),
-        ("acuity", chosen.acuity, Effects { acuity: true, ..nothing }),
-        ("colour", chosen.colour && !operator.always_loses_colour(), Effects { colour: true, ..nothing }),
+        ("glare", chosen.glare, known.glare),
+        ("acuity", chosen.acuity, known.acuity),
+        ("colour", chosen.colour, known.colour || operator.always_loses_colour()),
     ];
-    if let Some((effect, ..)) = effects.iter().find(|(_, is_chosen, effect)| *is_chosen && !knows(*effect)) {
+    if let Some((effect, ..)) = effects.iter().find(|(_, is_chosen, is_known)| *is_chosen && !is_known) {
         bail!("--effects {effect}: {name} does not show it");
     }
-    if chosen == nothing && !knows(Effects { glare: true, acuity: true, colour: true }) {
+    let nothing = Effects::default();
+    if chosen == nothing && known == nothing {
         bail!("--effects none: there are none that {name} could leave out");
     }
     Ok(())

@@ -1,5 +1,8 @@
 //! Errors and figures as people read them.
 
+/// What every figure of the perception model has to be read with.
+pub(super) const OF_THE_MODEL: &str = "model-predicted; calibrated on gratings, not on renderings";
+
 /// An error and its causes in one line. A cause that its effect's words end with, as those of many libraries do, is not said again;
 /// lines of a file that a parser quotes are left out, since its words name line and column.
 pub(crate) fn in_a_line(error: &anyhow::Error) -> String {

@@ -1,6 +1,6 @@
 //! Adding films of the same picture, and checking one that was in a file.
 
-use super::{Film, HalfPixel, PixelGuide, kept_m2, opponent};
+use super::{Film, HalfPixel, Moments, PixelGuide};
 use crate::sampler::Half;
 use fechner_perception::PIXELS_A_TASK;
 use rayon::prelude::*;
@@ -36,8 +36,8 @@ impl Film {
             |((guide, guide_of_a, a, b), (other_guide, other_guide_of_a, other_a, other_b))| {
                 guide.add(other_guide, a.samples + b.samples, other_a.samples + other_b.samples);
                 guide_of_a.add(other_guide_of_a, a.samples, other_a.samples);
-                a.add(other_a);
-                b.add(other_b);
+                a.combine(&Moments::of_half(other_a));
+                b.combine(&Moments::of_half(other_b));
             },
         );
         self.nonfinite_samples = self.nonfinite_samples.saturating_add(other.nonfinite_samples);
@@ -93,32 +93,10 @@ impl Film {
     }
 }
 
-impl HalfPixel {
-    /// Adds another half's samples (Chan, Golub and LeVeque 1983).
-    fn add(&mut self, other: &HalfPixel) {
-        self.taken = self.taken.saturating_add(other.taken);
-        if other.samples == 0 {
-            return;
-        }
-        let (own, others) = (f64::from(self.samples), f64::from(other.samples));
-        let (old, new) = (opponent(self.mean), opponent(other.mean));
-        for (c, m2) in self.m2.iter_mut().enumerate() {
-            let difference = new[c] - old[c];
-            let between = difference * difference * own * others / (own + others);
-            *m2 = kept_m2(f64::from(*m2) + f64::from(other.m2[c]) + between);
-        }
-        for (mean, other) in self.mean.iter_mut().zip(other.mean) {
-            *mean += (other - *mean) * others / (own + others);
-        }
-        self.samples = self.samples.saturating_add(other.samples);
-        self.missed = self.missed.saturating_add(other.missed);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::BlockSum;
+    use crate::film::{BlockSum, opponent};
     use crate::integrator::{BlockWork, FirstHit, PathSample};
     use glam::Vec3;
 

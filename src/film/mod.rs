@@ -55,30 +55,60 @@ fn kept_m2(m2: f64) -> f32 {
     m2.min(f64::from(f32::MAX)) as f32
 }
 
+/// Counts and moments of samples that are added to a pixel's half.
+struct Moments {
+    mean: [f64; 3],
+    m2: [f64; CHANNELS],
+    samples: u32,
+    taken: u32,
+    missed: u32,
+}
+
+impl Moments {
+    fn of_block(block: &BlockSum) -> Self {
+        let samples = f64::from(block.samples.max(1));
+        let mean = block.rgb.map(|sum| sum / samples);
+        let centre = opponent(mean);
+        Self {
+            mean,
+            m2: std::array::from_fn(|c| (block.squares[c] - samples * centre[c] * centre[c]).max(0.0)),
+            samples: block.samples,
+            taken: block.samples.saturating_add(block.nonfinite),
+            missed: block.missed,
+        }
+    }
+
+    fn of_half(half: &HalfPixel) -> Self {
+        let HalfPixel { mean, m2, samples, taken, missed } = *half;
+        Self { mean, m2: m2.map(f64::from), samples, taken, missed }
+    }
+}
+
 impl HalfPixel {
-    /// Adds a block (Chan, Golub and LeVeque 1983).
+    /// Adds a block.
     pub(crate) fn merge(&mut self, block: &BlockSum) {
-        self.taken += block.samples + block.nonfinite;
-        if block.samples == 0 {
+        self.combine(&Moments::of_block(block));
+    }
+
+    /// Adds other samples (Chan, Golub and LeVeque 1983). Counts end at their largest: [`Film::add`] and [`Film::check`] refuse what comes
+    /// near it.
+    fn combine(&mut self, others: &Moments) {
+        self.taken = self.taken.saturating_add(others.taken);
+        if others.samples == 0 {
             return;
         }
-        let (old, new) = (f64::from(self.samples), f64::from(block.samples));
-        let block_mean = block.rgb.map(|sum| sum / new);
-        let block_opponent = opponent(block_mean);
-        let difference: [f64; CHANNELS] = {
-            let own = opponent(self.mean);
-            std::array::from_fn(|c| block_opponent[c] - own[c])
-        };
-        for c in 0..CHANNELS {
-            let block_m2 = (block.squares[c] - new * block_opponent[c] * block_opponent[c]).max(0.0);
-            let between = difference[c] * difference[c] * old * new / (old + new);
-            self.m2[c] = kept_m2(f64::from(self.m2[c]) + block_m2 + between);
+        let (old, new) = (f64::from(self.samples), f64::from(others.samples));
+        let (own_centre, centre) = (opponent(self.mean), opponent(others.mean));
+        for (c, m2) in self.m2.iter_mut().enumerate() {
+            let difference = centre[c] - own_centre[c];
+            let between = difference * difference * old * new / (old + new);
+            *m2 = kept_m2(f64::from(*m2) + others.m2[c] + between);
         }
-        for (mean, block) in self.mean.iter_mut().zip(block_mean) {
-            *mean += (block - *mean) * new / (old + new);
+        for (mean, other) in self.mean.iter_mut().zip(others.mean) {
+            *mean += (other - *mean) * new / (old + new);
         }
-        self.samples += block.samples;
-        self.missed += block.missed;
+        self.samples = self.samples.saturating_add(others.samples);
+        self.missed = self.missed.saturating_add(others.missed);
     }
 
     /// Share of the samples whose camera ray met something; 1 for an empty pixel.

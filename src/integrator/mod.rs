@@ -182,6 +182,11 @@ impl SamplePlan {
     pub fn samples(&self) -> u64 {
         self.blocks.iter().map(|b| u64::from(b.samples)).sum()
     }
+
+    /// Itself, unless there is nothing to trace.
+    pub(crate) fn non_empty(self) -> Option<Self> {
+        if self.blocks.is_empty() { None } else { Some(self) }
+    }
 }
 
 /// A scene made ready for tracing.

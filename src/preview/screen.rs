@@ -338,7 +338,7 @@ mod tests {
     use super::super::shared::Seat;
     use super::*;
     use crate::film::BlockSum;
-    use crate::integrator::{BlockWork, PathSample};
+    use crate::integrator::{BlockWork, PathSample, TraceSettings};
     use glam::Vec3;
 
     /// Adds a block of samples of one grey.
@@ -351,7 +351,7 @@ mod tests {
 
     fn settings_with(operator: &str) -> LoopSettings {
         let operator = fechner_perception::tone::operator(operator, None).expect("an operator");
-        LoopSettings::new(fechner_perception::Viewing::default(), 100.0, operator)
+        LoopSettings::new(&TraceSettings::new(1, 1, 1), fechner_perception::Viewing::default(), 100.0, operator)
     }
 
     /// What is fresh is shown sooner than what changes little, and dear frames seldom.

@@ -299,12 +299,12 @@ fn what_cannot_be_run_is_refused() {
     for (arguments, why) in [
         (
             &["--suite", "denoise", "--denoise", "builtin", "--display", "wall"][..],
-            "there is no display \"wall\"; known: ",
+            "no display preset is called `wall`; there are: ",
         ),
         (&["--suite", "denoise", "--denoise", "none"], "--denoise none: the suite denoise judges denoised pictures"),
         (&[&again], "named twice, here and as "),
-        (&["--display", "wall"], "there is no display \"wall\"; known: "),
-        (&["--suite", "animation", "--display", "wall"], "there is no display \"wall\"; known: "),
+        (&["--display", "wall"], "no display preset is called `wall`; there are: "),
+        (&["--suite", "animation", "--display", "wall"], "no display preset is called `wall`; there are: "),
     ] {
         let refused = bench(&folder.path().join("out"), arguments);
         let said = String::from_utf8_lossy(&refused.stderr).into_owned();

@@ -6,7 +6,7 @@ use crate::support::{
 use fechner::film::Film;
 use fechner::geometry::Ray;
 use fechner::integrator::{BlockWork, Crop, PathTracer, SamplePlan, TraceSettings};
-use fechner::sampler::{Half, Sequence};
+use fechner::sampler::{Half, PixelFilter, Sequence};
 use fechner::scene::hash::content_hash;
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Motion, Scene};
@@ -35,8 +35,9 @@ struct Spot {
 }
 
 fn spot_of(scene: &Scene) -> Spot {
-    let film = film_of(scene, trace_settings(SIZE, SIZE, 3), 5);
-    let estimate = film.estimate(1.0);
+    // Of the box filter, whose variance is 1/12.
+    let settings = TraceSettings { filter: PixelFilter::Box, ..trace_settings(SIZE, SIZE, 3) };
+    let estimate = film_of(scene, settings, 5).estimate(1.0);
     let (mut weight, mut sum, mut squares) = (0.0, [0.0; 2], [0.0; 2]);
     for (i, rgb) in estimate.rgb_cd_m2.iter().enumerate() {
         let value = f64::from(rgb[0]);

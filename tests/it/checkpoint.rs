@@ -12,7 +12,7 @@ use fechner::checkpoint::{
 use fechner::denoise::{Denoiser, DenoiserKind};
 use fechner::film::Film;
 use fechner::integrator::{PathTracer, SamplePlan};
-use fechner::sampler::{Half, PixelFilter};
+use fechner::sampler::Half;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::csf::FrameTiming;
@@ -449,7 +449,9 @@ fn a_film_keeps_how_its_frame_is_seen() {
     setup.header.settings.gazes = vec![gaze];
     setup.through_a_file(&state);
     let record = &setup.header.settings;
-    let seen = record.loop_settings(Limits::of_visibility(1.0), PixelFilter::Box).expect("names that are known");
+    let seen = record
+        .loop_settings(Limits::of_visibility(1.0), setup.header.origin.tracing.settings())
+        .expect("names that are known");
     assert_eq!((seen.frames, seen.gazes), (Some(timing), vec![gaze]));
 
     for (frames, gaze) in [

@@ -2,9 +2,10 @@
 
 use crate::load_assets::assets;
 use crate::support::{loop_settings, trace_settings};
-use fechner::adaptive::settings::Sampling;
+use fechner::adaptive::settings::{LoopSettings, Sampling};
 use fechner::adaptive::{Quiet, render};
 use fechner::integrator::{PathTracer, TraceSettings};
+use fechner::sampler::PixelFilter;
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{ColorInput, Distribution, Scene, Surface, Texels, Texture, TextureId, TextureLookup, Wrap};
 use glam::{DVec3, Vec2, Vec3};
@@ -162,11 +163,13 @@ fn pictures_have_their_references_brightness() {
         let triangles: usize = scene.instances.iter().map(|i| scene.meshes[i.mesh.0 as usize].triangles.len()).sum();
         // Values of the file, not cd/m².
         scene.nits_per_unit = 1.0;
-        let trace = TraceSettings { max_depth: case.max_depth, ..trace_settings(width, height, 1) };
+        // A reference's pixels are reduced to means over ours, which is the box filter.
+        let filter = PixelFilter::Box;
+        let trace = TraceSettings { max_depth: case.max_depth, filter, ..trace_settings(width, height, 1) };
         if let Some(known) = &case.known {
             (known.change)(&mut scene);
         }
-        let settings = loop_settings(1.0, Sampling::Uniform, None, Some(case.samples));
+        let settings = LoopSettings { filter, ..loop_settings(1.0, Sampling::Uniform, None, Some(case.samples)) };
         let tracer = PathTracer::new(Arc::new(scene), trace);
         let rendered = render(&tracer, &settings, &Quiet).expect("the perception model takes the picture");
         let estimate = &rendered.judgement.estimate;

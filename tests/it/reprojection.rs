@@ -3,8 +3,8 @@
 use crate::support::{add_material, add_rectangle, diffuse, empty_scene, trace_settings};
 use fechner::animate::velocity::VelocityMap;
 use fechner::film::{Estimate, Film};
-use fechner::integrator::{BlockWork, PathTracer, SamplePlan};
-use fechner::sampler::Half;
+use fechner::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};
+use fechner::sampler::{Half, PixelFilter};
 use fechner::scene::{Camera, Environment, Scene};
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
@@ -35,7 +35,9 @@ fn wall(frame: f32) -> Scene {
 }
 
 fn tracer(scene: &Scene, seed: u64) -> PathTracer {
-    PathTracer::new(Arc::new(scene.clone()), trace_settings(WIDTH, HEIGHT, seed))
+    // No wider than a pixel, so that most patches have pixels that see nothing else.
+    let settings = TraceSettings { filter: PixelFilter::Box, ..trace_settings(WIDTH, HEIGHT, seed) };
+    PathTracer::new(Arc::new(scene.clone()), settings)
 }
 
 /// The same number of samples everywhere.

@@ -4,7 +4,7 @@ pub(crate) mod command;
 
 use fechner::adaptive::settings::{Limits, LoopSettings, Sampling, THRESHOLD};
 use fechner::integrator::{PathTracer, TraceSettings};
-use fechner::sampler::{BlockKey, Half, Pixel, PixelFilter, Sequence};
+use fechner::sampler::{BlockKey, Half, Pixel, Sequence};
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{
     Alpha, Camera, ColorInput, Environment, FilmDefaults, Instance, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
@@ -86,8 +86,9 @@ pub(crate) fn add_rectangle(scene: &mut Scene, corner: Vec3, edge_u: Vec3, edge_
     add_mesh(scene, mesh, material);
 }
 
+/// How tests trace that ask for nothing: as the program does.
 pub(crate) fn trace_settings(width: u32, height: u32, seed: u64) -> TraceSettings {
-    TraceSettings { filter: PixelFilter::Box, ..TraceSettings::new(width, height, seed) }
+    TraceSettings::new(width, height, seed)
 }
 
 /// A block of samples by number, of at most 2^18.
@@ -115,7 +116,7 @@ pub(crate) fn radiance_along(
     (mean, (variance / blocks as f32).powf(0.5))
 }
 
-/// Settings for the display `desktop` and constant scaling.
+/// Settings for the display `desktop` and constant scaling, of what [`trace_settings`] trace.
 ///
 /// Without a visibility only `spp` counts.
 pub(crate) fn loop_settings(
@@ -127,7 +128,7 @@ pub(crate) fn loop_settings(
     let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
     let operator = tone::operator("constant", None).expect("an operator");
     let limits = Limits { visibility: visibility.into(), mean_samples: spp, ..Limits::of_visibility(THRESHOLD) };
-    LoopSettings { sampling, limits, ..LoopSettings::new(viewing, nits_per_unit, operator) }
+    LoopSettings { sampling, limits, ..LoopSettings::new(&trace_settings(1, 1, 1), viewing, nits_per_unit, operator) }
 }
 
 /// Loads a scene file of such content; what went wrong.

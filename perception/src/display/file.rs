@@ -41,11 +41,7 @@ impl DisplayFile {
 
     fn base(&self) -> Result<Display, Error> {
         let preset = self.preset.as_deref().unwrap_or("desktop");
-        let mut base = Display::preset(preset).ok_or_else(|| Error::UnknownName {
-            kind: "display preset",
-            name: preset.to_owned(),
-            known: Display::preset_names().join(", "),
-        })?;
+        let mut base = Display::named(preset)?;
         if self.preset.is_none() {
             "file".clone_into(&mut base.name);
         }

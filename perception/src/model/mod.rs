@@ -160,6 +160,14 @@ pub fn by_name(name: &str) -> Option<Box<dyn ThresholdModel>> {
     })
 }
 
+/// [`by_name`], for names that somebody has given.
+///
+/// # Errors
+/// [`Error::UnknownName`], which lists those that there are.
+pub fn named(name: &str) -> Result<Box<dyn ThresholdModel>, Error> {
+    by_name(name).ok_or_else(|| Error::unknown_name("threshold model", name, names()))
+}
+
 /// A function of adaptation luminance, asked once on a fine grid instead of once a pixel.
 struct PerLuminance(UniformTable);
 

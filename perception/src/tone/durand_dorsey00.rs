@@ -44,6 +44,10 @@ impl ToneOperator for DurandDorsey00 {
         true
     }
 
+    fn knows_places(&self) -> bool {
+        true
+    }
+
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let density = viewing.display.pixel_density();
         let white_cd_m2 = viewing.display.white_cd_m2.max(f64::MIN_POSITIVE);

@@ -4,7 +4,7 @@ use super::acuity::AcuityFilter;
 use super::duplex::{DuplexLaw, FittedDuplex, RodWeight, adapted};
 use super::field::{AdaptationScope, LocalAdaptation};
 use super::time::AdaptationState;
-use super::{FittedTone, SceneGuide, ToneOperator};
+use super::{Effects, FittedTone, SceneGuide, ToneOperator};
 use crate::display::Viewing;
 
 /// Keeps thresholds of rods and of cones, each by its own law; what rods see has no colour, and what the eye does not
@@ -38,6 +38,14 @@ impl ToneOperator for Ferwerda96 {
 
     fn sees_rods(&self) -> bool {
         true
+    }
+
+    fn knows_places(&self) -> bool {
+        true
+    }
+
+    fn optional_effects(&self) -> Effects {
+        Effects { acuity: true, ..Effects::default() }
     }
 
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {

@@ -35,12 +35,6 @@ impl<'a> SceneGuide<'a> {
         Self { luminance_cd_m2, scotopic_cd_m2: None, gaze: None }
     }
 
-    /// The same with what the rods see.
-    #[must_use]
-    pub fn with_scotopic(self, scotopic_cd_m2: &'a Plane) -> Self {
-        Self { scotopic_cd_m2: Some(scotopic_cd_m2), ..self }
-    }
-
     /// The same with the eye on one pixel.
     #[must_use]
     pub fn with_gaze(self, gaze: Option<Pixel>) -> Self {

@@ -58,7 +58,9 @@ pub use durand_dorsey00::DurandDorsey00;
 pub use ferwerda96::Ferwerda96;
 pub use field::AdaptationScope;
 pub use guide::{Pixel, SceneGuide};
-pub use names::{DEFAULT_OPERATOR, Effects, ToneSettings, operator, operator_initials, operator_names, operator_with};
+pub use names::{
+    DEFAULT_OPERATOR, Effects, ToneSettings, operator, operator_initials, operator_named, operator_names, operator_with,
+};
 pub use pattanaik00::Pattanaik00;
 pub use pbr_neutral::PbrNeutral;
 pub use picture::{map_picture, map_pixels};
@@ -107,6 +109,16 @@ pub trait ToneOperator: Send + Sync + Debug {
     /// Whether it loses colour in dim light whatever it is asked for.
     fn always_loses_colour(&self) -> bool {
         false
+    }
+
+    /// Whether [`ToneSettings::scope`] changes what it shows.
+    fn knows_places(&self) -> bool {
+        false
+    }
+
+    /// Which of [`ToneSettings::effects`] it can show and leave out.
+    fn optional_effects(&self) -> Effects {
+        Effects::default()
     }
 
     /// Whether it looks at what the rods see of the guide ([`SceneGuide::scotopic_cd_m2`]).

@@ -5,6 +5,7 @@ use super::{
     Absolute, Agx, Ceiling, Constant, DurandDorsey00, Exposure, Ferwerda96, Linear, Pattanaik00, PbrNeutral,
     Reinhard02, Scheel00, Srgb, ToneOperator, TumblinRushmeier, Ward94, WardLarson97,
 };
+use crate::error::Error;
 
 /// What an eye loses besides brightness, for the operators that can show it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,6 +101,14 @@ pub fn operator_with(name: &str, settings: &ToneSettings) -> Option<Box<dyn Tone
         "agx" => Box::new(Agx { exposure }),
         _ => return None,
     })
+}
+
+/// [`operator_with`], for names that somebody has given.
+///
+/// # Errors
+/// [`Error::UnknownName`], which lists those that there are.
+pub fn operator_named(name: &str, settings: &ToneSettings) -> Result<Box<dyn ToneOperator>, Error> {
+    operator_with(name, settings).ok_or_else(|| Error::unknown_name("tone operator", name, operator_names()))
 }
 
 /// The initials that [`operator`] knows besides, each with the name that it stands for.

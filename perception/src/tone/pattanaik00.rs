@@ -191,6 +191,10 @@ impl ToneOperator for Pattanaik00 {
         true
     }
 
+    fn knows_places(&self) -> bool {
+        true
+    }
+
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let density = viewing.display.pixel_density();
         let adapted = || AdaptationState::adapted_to(Goal::of(guide, density), &self.kinetics());

@@ -34,6 +34,10 @@ impl ToneOperator for Reinhard02 {
         "reinhard02"
     }
 
+    fn knows_places(&self) -> bool {
+        true
+    }
+
     fn fit(&self, guide: &SceneGuide<'_>, _viewing: &Viewing, _state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let plane = guide.luminance_cd_m2;
         let greatest = plane.values().iter().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);

@@ -65,6 +65,26 @@ fn check_fit(name: &str, fitted: &dyn FittedTone, pixel: Pixel) {
     }
 }
 
+/// Operators of different settings differ in their `Debug` form.
+#[test]
+fn every_operator_says_which_settings_change_it() {
+    for name in operator_names() {
+        let with = |settings: ToneSettings| format!("{:?}", operator_with(name, &settings).unwrap());
+        let operator = operator(name, None).unwrap();
+        let local = ToneSettings { scope: AdaptationScope::Local, ..ToneSettings::default() };
+        assert_eq!(operator.knows_places(), with(local) != with(ToneSettings::default()), "{name}");
+        let with = |effects| with(ToneSettings { effects: Some(effects), ..ToneSettings::default() });
+        let nothing = Effects::default();
+        let knows = |effect| with(effect) != with(nothing);
+        let known = Effects {
+            glare: knows(Effects { glare: true, ..nothing }),
+            acuity: knows(Effects { acuity: true, ..nothing }),
+            colour: knows(Effects { colour: true, ..nothing }),
+        };
+        assert_eq!(operator.optional_effects(), known, "{name}");
+    }
+}
+
 #[test]
 fn black_is_black_to_every_operator_that_has_no_veil() {
     let guide = Plane::from_fn(64, 64, |x, y| (x * y) as f32 * 0.1);
@@ -180,7 +200,7 @@ fn what_rods_see_moves_those_who_look_at_it_and_nobody_else() {
         let operator = operator(name, None).unwrap();
         let at = |guide: SceneGuide<'_>| operator.fit(&guide, &Viewing::default(), None).relative_luminance(0.05);
         let grey = SceneGuide::of(&photopic);
-        let moved = (at(grey.with_scotopic(&scotopic)) / at(grey) - 1.0).abs() > 0.01;
+        let moved = (at(SceneGuide { scotopic_cd_m2: Some(&scotopic), ..grey }) / at(grey) - 1.0).abs() > 0.01;
         assert_eq!(moved, operator.sees_rods(), "{name}");
     }
 }

@@ -39,6 +39,10 @@ impl ToneOperator for TumblinRushmeier {
         true
     }
 
+    fn knows_places(&self) -> bool {
+        true
+    }
+
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let density = viewing.display.pixel_density();
         let screen = Screen::of(&viewing.display);

@@ -33,6 +33,10 @@ impl ToneOperator for Ward94 {
         true
     }
 
+    fn knows_places(&self) -> bool {
+        true
+    }
+
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let density = viewing.display.pixel_density();
         let adaptation_cd_m2 =

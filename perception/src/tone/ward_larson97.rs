@@ -55,6 +55,10 @@ impl ToneOperator for WardLarson97 {
         true
     }
 
+    fn optional_effects(&self) -> Effects {
+        Effects { glare: true, acuity: true, colour: true }
+    }
+
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, _state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let density = viewing.display.pixel_density();
         let clean = guide.luminance_cd_m2.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 });

@@ -14,7 +14,7 @@ use super::{AnimateArguments, AovNames, EyeChoice, VelocityChoice};
 use crate::cli::console::Console;
 use crate::cli::json::write_json;
 use crate::cli::report::Report;
-use crate::cli::seeing::{Presentation, tone_operator};
+use crate::cli::seeing::Presentation;
 use crate::cli::targets::{Named, check_kept, check_scene_kept};
 use anyhow::{Context, Result, bail};
 use fechner::adaptive::settings::LoopSettings;
@@ -26,7 +26,7 @@ use fechner::denoise::Denoiser;
 use fechner::output::rendered::{Background, layers, write_display_png};
 use fechner::output::{self, Attribute, Format};
 use fechner::scene::Scene;
-use fechner_perception::tone::{ToneOperator, ToneSettings};
+use fechner_perception::tone::{ToneOperator, ToneSettings, operator_named};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -173,7 +173,7 @@ impl<'a> Shot<'a> {
 
     fn operator(&self) -> Result<Box<dyn ToneOperator>> {
         let exposure_stops = self.exposure_stops.unwrap_or(0.0);
-        tone_operator(&self.operator_name, &ToneSettings { exposure_stops, ..ToneSettings::default() })
+        Ok(operator_named(&self.operator_name, &ToneSettings { exposure_stops, ..ToneSettings::default() })?)
     }
 
     /// Those of the frames to render that are not there as this run would make them. Reads all their scenes.

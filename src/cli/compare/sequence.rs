@@ -6,9 +6,8 @@ use crate::cli::json::write_json;
 use crate::cli::kept_tone::{as_rendered, first_scene};
 use crate::cli::maps::check_map;
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
-use crate::cli::seeing::tone_operator;
 use crate::cli::targets::check_kept;
-use crate::cli::words::count;
+use crate::cli::words::{OF_THE_MODEL, count};
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::animate::spread_over;
@@ -17,7 +16,7 @@ use fechner_perception::csf;
 use fechner_perception::display::Viewing;
 use fechner_perception::sequence::{FrameMotion, SequenceFrame, SequenceObserver};
 use fechner_perception::tone::{
-    AdaptationState, DEFAULT_OPERATOR, FittedTone, Goal, SceneLight, ToneOperator, ToneSettings,
+    AdaptationState, DEFAULT_OPERATOR, FittedTone, Goal, SceneLight, ToneOperator, ToneSettings, operator_named,
 };
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -230,7 +229,7 @@ impl<'a> Sequences<'a> {
         let showing = if asked.is_none() && as_rendered(&firsts, &viewing).is_some() {
             Showing::AsRendered
         } else {
-            let operator = tone_operator(asked.unwrap_or(DEFAULT_OPERATOR), &ToneSettings::default())?;
+            let operator = operator_named(asked.unwrap_or(DEFAULT_OPERATOR), &ToneSettings::default())?;
             // One exposure for the whole sequence, as a viewer would hold it.
             let fit_to = |name: &FrameName| fit(operator.as_ref(), name, numbers, nits_per_unit, &viewing);
             Showing::By(match fit_to(&reference)? {
@@ -303,19 +302,12 @@ impl<'a> Sequences<'a> {
             visible_fraction: mean(|seen| seen.visible_fraction),
             ..worst.seen
         };
+        let operator = match &self.showing {
+            Showing::AsRendered => Some("of each frame, as it was rendered".to_owned()),
+            Showing::By(fitted) => fitted.as_ref().map(|fitted| fitted.describe()),
+        };
         let figures = SequenceFigures {
-            all: Figures {
-                reference: self.arguments.reference.display().to_string(),
-                test: self.arguments.test.display().to_string(),
-                display: self.viewing.display.name.clone(),
-                pixels_per_degree: self.viewing.display.pixels_per_degree,
-                csf: csf::DEFAULT,
-                operator: match &self.showing {
-                    Showing::AsRendered => Some("of each frame, as it was rendered".to_owned()),
-                    Showing::By(fitted) => fitted.as_ref().map(|fitted| fitted.describe()),
-                },
-                seen,
-            },
+            all: Figures::of(self.arguments, &self.viewing, csf::DEFAULT, operator, seen),
             frames_per_second: self.viewing.display.frames_per_second,
             eye_follows: self.velocity.is_some(),
             worst_frame: worst.frame,
@@ -326,8 +318,7 @@ impl<'a> Sequences<'a> {
         }
         answer!(
             "{}: worst visibility {:.2} in frame {} (seen in a 1° patch with {:.1} %), {:.2} % of {} above threshold, \
-             on \"{}\" at {} pixels a degree and {} frames a second, by an eye that {} (model-predicted; calibrated on \
-             gratings, not on renderings)",
+             on \"{}\" at {} pixels a degree and {} frames a second, by an eye that {} ({OF_THE_MODEL})",
             if seen.is_visible { "visible in motion" } else { "the same to the eye in motion" },
             seen.worst_visibility,
             figures.worst_frame,
@@ -365,7 +356,7 @@ mod tests {
             write_exr(&name.of(frame), &picture).expect("written");
         }
         let shown = |operator: &str| {
-            let operator = tone_operator(operator, &ToneSettings::default()).expect("an operator");
+            let operator = operator_named(operator, &ToneSettings::default()).expect("an operator");
             let fitted = fit(operator.as_ref(), &name, &[1, 2, 3, 4], None, &Viewing::default()).expect("read");
             fitted.expect("scene light").relative_luminance(1.0)
         };

@@ -47,22 +47,28 @@ pub(super) enum JobOptions {
 /// The same, with what all frames share.
 pub(super) enum Job<'a> {
     Still(&'a JobArguments),
-    Shot { shot: Box<Shot<'a>>, track: OnceCell<Track> },
+    Shot(Box<TrackedShot<'a>>),
 }
 
-/// Everything about one frame.
-pub(super) struct Frame {
+/// A shot, and how light it is once somebody has asked.
+pub(super) struct TrackedShot<'a> {
+    shot: Shot<'a>,
+    track: OnceCell<Track>,
+}
+
+/// Everything about one frame of a job.
+pub(super) struct Frame<'a> {
     scene: Arc<Scene>,
     trace: TraceSettings,
     header: Header,
     /// Hash of all that its film is judged by.
     judged_by: ContentHash,
-    kind: FrameKind,
+    kind: FrameKind<'a>,
 }
 
-enum FrameKind {
-    Still(Box<LoopSettings>),
-    OfShot(Box<ShotFrame>),
+enum FrameKind<'a> {
+    Still { arguments: &'a JobArguments, settings: Box<LoopSettings> },
+    OfShot { shot: &'a Shot<'a>, frame: Box<ShotFrame> },
 }
 
 impl JobOptions {
@@ -118,7 +124,10 @@ impl JobOptions {
     pub(super) fn job(&self) -> Result<Job<'_>> {
         match self {
             Self::Still(arguments) => Ok(Job::Still(arguments)),
-            Self::Shot(arguments) => Ok(Job::Shot { shot: Box::new(Shot::new(arguments)?), track: OnceCell::new() }),
+            Self::Shot(arguments) => {
+                let shot = Shot::new(arguments)?;
+                Ok(Job::Shot(Box::new(TrackedShot { shot, track: OnceCell::new() })))
+            }
         }
     }
 
@@ -133,12 +142,12 @@ impl JobOptions {
 
 impl Job<'_> {
     /// Everything about a frame as it is now.
-    pub(super) fn frame(&self, number: u32) -> Result<Frame> {
+    pub(super) fn frame(&self, number: u32) -> Result<Frame<'_>> {
         self.frame_beside(number, None)
     }
 
     /// The same. A part is shown as it was in a film of it that may be there: to find out how the whole is shown takes seconds.
-    fn frame_beside(&self, number: u32, film: Option<&Path>) -> Result<Frame> {
+    fn frame_beside(&self, number: u32, film: Option<&Path>) -> Result<Frame<'_>> {
         match self {
             Self::Still(arguments) => {
                 let mut prepared = arguments.prepare_samples()?;
@@ -149,24 +158,26 @@ impl Job<'_> {
                 let Prepared { scene, trace, record, settings, .. } = prepared;
                 let judged_by = ContentHash::of_bytes(format!("{record:?}|{:?}", settings.limits).as_bytes());
                 let header = Header::begun(origin, trace.seed, record, settings.limits.last_rung());
-                let kind = FrameKind::Still(Box::new(settings));
+                let kind = FrameKind::Still { arguments, settings: Box::new(settings) };
                 Ok(Frame { scene, trace, header, judged_by, kind })
             }
-            Self::Shot { shot, .. } => {
-                let of_shot = shot.frame(number, self.track(number)?)?;
+            Self::Shot(tracked) => {
+                let shot = &tracked.shot;
+                let of_shot = shot.frame(number, tracked.track(number)?)?;
                 let trace = shot.settings.trace_settings(number);
                 let origin = Origin { scene_name: shot.scene_name(), ..Origin::of(&of_shot.scenes.now, &trace) };
                 let aim = of_shot.settings.limits.last_rung();
                 let header = Header::begun(origin, trace.seed, shot.settings_record(&of_shot.settings), aim);
                 let judged_by = ContentHash::of_bytes(of_shot.key.as_bytes());
                 let scene = Arc::clone(&of_shot.scenes.now);
-                Ok(Frame { scene, trace, header, judged_by, kind: FrameKind::OfShot(Box::new(of_shot)) })
+                let kind = FrameKind::OfShot { shot, frame: Box::new(of_shot) };
+                Ok(Frame { scene, trace, header, judged_by, kind })
             }
         }
     }
 
     /// A frame of a farm, if it still is the one that was planned.
-    pub(super) fn planned_frame(&self, farm: &Farm, frame_index: usize) -> Result<Frame> {
+    pub(super) fn planned_frame(&self, farm: &Farm, frame_index: usize) -> Result<Frame<'_>> {
         let entry = farm.frame(frame_index);
         let frame = self.frame_beside(entry.frame, Some(&farm.film(frame_index)))?;
         check_origin(farm, entry, &frame.header.origin)?;
@@ -190,7 +201,8 @@ impl Job<'_> {
                 let origin = Origin { scene_name: arguments.scene_name(), ..Origin::of(&scene, &trace) };
                 (scene, trace, origin)
             }
-            Self::Shot { shot, .. } => {
+            Self::Shot(tracked) => {
+                let shot = &tracked.shot;
                 let (scene, trace) = (shot.scene(entry.frame)?, shot.settings.trace_settings(entry.frame));
                 let origin = Origin::of(&scene, &trace);
                 (scene, trace, origin)
@@ -200,44 +212,12 @@ impl Job<'_> {
         Ok(PathTracer::new(scene, trace))
     }
 
-    /// How light the shot is: from the file beside the pictures, or made anew where that is not of this frame's scene. Other
-    /// frames are looked at when they are asked for: a process that merges one should not have to read the scenes of all.
-    fn track(&self, number: u32) -> Result<&Track> {
-        let Self::Shot { shot, track } = self else { bail!("a still has no track") };
-        match track.get() {
-            Some(track) => Ok(track),
-            None => {
-                let found = shot.track(number..=number)?;
-                Ok(track.get_or_init(|| found))
-            }
-        }
-    }
-
-    /// Writes the pictures of a finished frame, and says its figures.
-    pub(super) fn write(&self, farm: &Farm, frame_index: usize, frame: &Frame, rendered: Rendered) -> Result<Report> {
-        match (self, &frame.kind) {
-            (Self::Still(arguments), FrameKind::Still(settings)) => {
-                let report = Report::new(&arguments.scene_name(), &frame.header.seeds.all, settings, &rendered);
-                let path = farm.picture(frame_index);
-                let format = output::check_target(&path)?;
-                let part_of = frame.header.origin.part_of();
-                write_picture(&path, format, arguments.background(), &rendered, settings, &report, part_of)?;
-                say!("{}: {}", path.display(), report.in_a_line());
-                Ok(report)
-            }
-            (Self::Shot { shot, .. }, FrameKind::OfShot(of_shot)) => {
-                let velocity = of_shot.scenes.velocity(&frame.tracer(), shot.settings.velocity_of);
-                shot.keep(farm.frame(frame_index).frame, of_shot, &RenderedFrame { rendered, velocity })
-            }
-            _ => bail!("a frame of another farm"),
-        }
-    }
-
     /// Whether the farm's frames are all of the shot, not a part of one.
     pub(super) fn is_whole(&self, farm: &Farm) -> bool {
         match self {
             Self::Still(_) => true,
-            Self::Shot { shot, .. } => {
+            Self::Shot(tracked) => {
+                let shot = &tracked.shot;
                 let all = shot.settings.last - shot.settings.first + 1;
                 farm.manifest().frames.len() == all as usize
             }
@@ -248,13 +228,14 @@ impl Job<'_> {
     pub(super) fn check_video(&self) -> Result<()> {
         match self {
             Self::Still(_) => Ok(()),
-            Self::Shot { shot, .. } => shot.check_video(),
+            Self::Shot(tracked) => tracked.shot.check_video(),
         }
     }
 
     /// Refuses a video of a shot of which the farm makes a part, whose other frames can never come to be beside them.
     pub(super) fn check_whole_video(&self, frames: usize) -> Result<()> {
-        let Self::Shot { shot, .. } = self else { return Ok(()) };
+        let Self::Shot(tracked) = self else { return Ok(()) };
+        let shot = &tracked.shot;
         let all = shot.settings.last - shot.settings.first + 1;
         if shot.asks_for_video()? && frames != all as usize {
             bail!(
@@ -267,13 +248,46 @@ impl Job<'_> {
     /// Makes what only a whole shot has, if all its frames are there; whether they are.
     pub(super) fn conclude(&self) -> Result<bool> {
         match self {
-            Self::Shot { shot, .. } => shot.conclude(self.track(shot.settings.first)?),
+            Self::Shot(tracked) => tracked.shot.conclude(tracked.track(tracked.shot.settings.first)?),
             Self::Still(_) => Ok(true),
         }
     }
 }
 
-impl Frame {
+impl TrackedShot<'_> {
+    /// How light the shot is: from the file beside the pictures, or made anew where that is not of this frame's scene. Other
+    /// frames are looked at when they are asked for: a process that merges one should not have to read the scenes of all.
+    fn track(&self, number: u32) -> Result<&Track> {
+        match self.track.get() {
+            Some(track) => Ok(track),
+            None => {
+                let found = self.shot.track(number..=number)?;
+                Ok(self.track.get_or_init(|| found))
+            }
+        }
+    }
+}
+
+impl Frame<'_> {
+    /// Writes the pictures of the frame when it is finished, and says its figures.
+    pub(super) fn write(&self, farm: &Farm, frame_index: usize, rendered: Rendered) -> Result<Report> {
+        match &self.kind {
+            FrameKind::Still { arguments, settings } => {
+                let report = Report::new(&arguments.scene_name(), &self.header.seeds.all, settings, &rendered);
+                let path = farm.picture(frame_index);
+                let format = output::check_target(&path)?;
+                let part_of = self.header.origin.part_of();
+                write_picture(&path, format, arguments.background(), &rendered, settings, &report, part_of)?;
+                say!("{}: {}", path.display(), report.in_a_line());
+                Ok(report)
+            }
+            FrameKind::OfShot { shot, frame } => {
+                let velocity = frame.scenes.velocity(&self.tracer(), shot.settings.velocity_of);
+                shot.keep(farm.frame(frame_index).frame, frame, &RenderedFrame { rendered, velocity })
+            }
+        }
+    }
+
     /// Its entry in a manifest.
     pub(super) fn entry(&self, frame: u32) -> FrameEntry {
         let origin = self.header.origin.clone();
@@ -288,8 +302,8 @@ impl Frame {
     /// By which its film is judged.
     pub(super) fn settings(&self) -> &LoopSettings {
         match &self.kind {
-            FrameKind::Still(settings) => settings,
-            FrameKind::OfShot(of_shot) => &of_shot.settings,
+            FrameKind::Still { settings, .. } => settings,
+            FrameKind::OfShot { frame, .. } => &frame.settings,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Report, TOO_FEW, patch_count};
 use crate::cli::console::duration_in_words;
-use crate::cli::words::{count, rounded};
+use crate::cli::words::{OF_THE_MODEL, count, rounded};
 use fechner::adaptive::audit::MOST_INFLATION;
 use fechner::adaptive::settings::{LoopSettings, Sampling};
 use fechner::adaptive::{Rendered, StopReason};
@@ -92,7 +92,7 @@ fn noticed(report: &Report, display: &Display, predicted: &Plane) -> Option<Stri
     Some(format!(
         "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining {} \
          is detected in a 1° patch is {:.1} % at the 99th percentile (visibility {p99:.2}); about {noticed:.1} of {:.1} patches.\n\
-         Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered.",
+         Light paths never sampled are not covered ({OF_THE_MODEL}).",
         display.name,
         rounded(display.pixels_per_degree),
         rounded(display.white_cd_m2),

@@ -53,7 +53,7 @@ pub(super) fn settings_of(job: &Job, live: &Live, whole: Option<&SceneLight>) ->
     record.operator = live.operator.clone().unwrap_or(record.operator);
     // The job's own display may have no preset's name, or more than the preset of its name.
     if let Some(name) = live.display.as_ref().filter(|name| **name != record.viewing.display.name) {
-        let display = Display::preset(name).ok_or_else(|| format!("there is no display \"{name}\""))?;
+        let display = Display::named(name).map_err(|error| error.to_string())?;
         let Observer { sensitivity, glare, .. } = record.viewing.observer;
         record.viewing = Viewing::of(display);
         let own = record.viewing.observer.csf_area_deg2;
@@ -72,8 +72,7 @@ pub(super) fn settings_of(job: &Job, live: &Live, whole: Option<&SceneLight>) ->
         return Err(format!("exposure must be from -{MOST_EXPOSURE_STOPS} to {MOST_EXPOSURE_STOPS} stops"));
     }
     let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..job.limits };
-    let mut settings = record.loop_settings(limits, job.trace.filter).map_err(|error| error.to_string())?;
-    settings.is_transparent = job.trace.transparent;
+    let mut settings = record.loop_settings(limits, &job.trace).map_err(|error| error.to_string())?;
     if let Some(whole) = whole {
         settings.fit_to(whole);
     }

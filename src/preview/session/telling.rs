@@ -2,7 +2,7 @@
 
 use super::Session;
 use crate::adaptive::settings::LoopSettings;
-use crate::adaptive::state::{RenderState, pilot_samples};
+use crate::adaptive::state::RenderState;
 use crate::adaptive::{Progress, StopReason, visible_share};
 use crate::preview::command::{Phase, Status};
 use crate::preview::orbit::Held;
@@ -64,7 +64,7 @@ pub(in crate::preview) fn blank_status(scene: &Scene, settings: &LoopSettings, o
         samples_a_second: 0.0,
         seconds: 0.0,
         seconds_left: None,
-        pilot_samples: pilot_samples(&settings.limits),
+        pilot_samples: settings.limits.pilot(),
         visible_share: None,
         target: settings.limits.last_rung(),
         rung: None,
@@ -137,6 +137,7 @@ pub(in crate::preview) fn in_words(reason: StopReason) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrator::TraceSettings;
     use fechner_perception::display::Viewing;
     use fechner_perception::tone::operator;
 
@@ -144,7 +145,12 @@ mod tests {
     #[test]
     fn the_first_look_says_when_it_comes() {
         let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
-        let settings = LoopSettings::new(viewing, 100.0, operator("constant", None).expect("an operator"));
+        let settings = LoopSettings::new(
+            &TraceSettings::new(1, 1, 1),
+            viewing,
+            100.0,
+            operator("constant", None).expect("an operator"),
+        );
         let mut status =
             blank_status(&Scene::default(), &settings, "constant", &Held::at_home(&Scene::default().camera));
         (status.width, status.height) = (10, 10);
