@@ -16,7 +16,7 @@ use std::f32::consts::TAU;
 /// Triangles and spheres that are looked at, of objects with the fewest triangles first; the rest is left to chance. Each takes 3 µs: some of
 /// what the first samples of a pixel take.
 const FACETS_A_PIXEL: f32 = 0.25;
-const FEWEST_FACETS: usize = 1 << 13;
+const FEWEST_FACETS: usize = 1 << 12;
 const MOST_FACETS: usize = 1 << 16;
 /// Places around a spot that are looked at.
 const AROUND: u32 = 8;
@@ -26,6 +26,8 @@ const AWAY: f32 = 1.5;
 const MOST_ALIKE: usize = 2;
 /// Paths that ask how bright a spot is. Each place around it has one.
 const PATHS: u32 = 4;
+/// Such paths over the film's pixels, at most: a thirtieth of what their first samples take.
+const PATHS_A_PIXEL: f32 = 0.5;
 /// What differs by less from what is around it, over that, is left to chance: of a sixteenth of a pixel sixteen samples would scatter by 2 %.
 pub(super) const LEAST_CONTRAST: f32 = 0.3;
 /// Or by fewer standard errors of these paths.
@@ -96,7 +98,7 @@ impl PathTracer {
     /// The spots that lamps have, and those of other things that are unlike all that is around them.
     pub(super) fn bright_spots(&self, camera: &CameraAt<'_>, spots: Vec<Spot>, moment: &Moment) -> Vec<BrightSpot> {
         let alone: Vec<Spot> = spots.into_par_iter().filter(|spot| self.is_alone(camera, spot)).collect();
-        let affordable = self.settings.film_area().pixels() / moment.of;
+        let affordable = (PATHS_A_PIXEL * self.settings.film_area().pixels() as f32) as usize / moment.of;
         // Neighbours in the list are mostly neighbours in the picture.
         let alike = (alone.len() * (PATHS + AROUND) as usize).div_ceil(affordable.max(1)).max(1);
         let asked: Vec<usize> = (0..alone.len()).step_by(alike).collect();
