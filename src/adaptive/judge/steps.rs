@@ -102,7 +102,7 @@ impl Scatter {
 
     /// Displayed over scene variance of luminance for what each half decides by: of the other half's light and noise. Where both halves' went
     /// in, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
-    /// tube of light made a picture 2.75 % too bright (`benches/results/sampling.md`, lamps on black). Of both are still which pixels shine, how
+    /// tube of light made a picture 2.75 % too bright (`benches/results/sampling.md`, lamps on black, dust and wires). Of both are still which pixels shine, how
     /// many samples there are, the scales of colour, which the display does not clip, and what is seen over white. `lights`: of the halves.
     pub(super) fn luminance_scales_of_halves(
         &self,
