@@ -6,7 +6,7 @@ use super::PathTracer;
 use super::shading::Components;
 use crate::geometry::{Hit, Ray};
 use crate::scene::{ScalarInput, Surface};
-use glam::Vec3;
+use glam::{Mat3A, Vec3, Vec3A};
 use smallvec::SmallVec;
 
 /// Mirrors and boundaries that are followed at most: what is seen behind more of them has hardly an image.
@@ -41,6 +41,8 @@ pub struct SpecularPath {
     pub end: Option<Hit>,
     /// From the camera to the end over all surfaces; infinite where the last ray leaves the scene.
     pub length: f32,
+    /// Turns directions along the last ray into those in which plane mirrors in place of its surfaces show them; glass turns none.
+    pub unfolded: Mat3A,
 }
 
 /// What a smooth surface does with a ray.
@@ -59,6 +61,7 @@ impl PathTracer {
     /// neither, or there are more than eight.
     pub fn follow_specular(&self, camera_ray: Ray) -> Option<SpecularPath> {
         let (mut ray, mut length, mut vertices) = (camera_ray, 0.0, SmallVec::new());
+        let mut unfolded = Mat3A::IDENTITY;
         loop {
             let hit = self.world.closest(&ray);
             let next = hit.as_ref().and_then(|hit| self.specular_bounce(&ray, hit, None));
@@ -66,11 +69,15 @@ impl PathTracer {
             match (hit, next) {
                 (Some(hit), Some(bounce)) if vertices.len() < MOST_VERTICES => {
                     vertices.push(SpecularVertex { object: hit.object, event: bounce.event });
+                    if bounce.event == SpecularEvent::Reflected {
+                        unfolded *= mirroring(bounce.next.direction - ray.direction);
+                    }
                     ray = bounce.next;
                 }
                 (_, Some(_)) => return None,
                 (end, None) => {
-                    return (!vertices.is_empty()).then_some(SpecularPath { vertices, last_ray: ray, end, length });
+                    let path = SpecularPath { vertices, last_ray: ray, end, length, unfolded };
+                    return (!path.vertices.is_empty()).then_some(path);
                 }
             }
         }
@@ -112,6 +119,12 @@ impl PathTracer {
             (is_wanted && shading.sides_agree(wo, wi)).then_some(SpecularBounce { event, next })
         })
     }
+}
+
+/// Directions mirrored in a plane across a vector of any length; the identity for none.
+fn mirroring(across: Vec3A) -> Mat3A {
+    let normal = across.normalize_or_zero();
+    Mat3A::IDENTITY - Mat3A::from_cols(normal.x * normal, normal.y * normal, normal.z * normal) * 2.0
 }
 
 /// Whether a perceptual roughness may be so small somewhere that it counts as none.

@@ -180,6 +180,18 @@ fn extensions_of_materials_are_named_though_the_file_declares_none() {
     }
 }
 
+/// The note said that the mesh is left out.
+#[test]
+fn a_mesh_of_many_instances_is_there_once() {
+    let mut file = File::new();
+    file.document["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": {}}});
+    file.document["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    let scene = file.load().unwrap();
+    let expected = "EXT_mesh_gpu_instancing is not supported: a mesh that it repeats is rendered once, at its node.";
+    assert!(scene.notes.iter().any(|note| note == expected), "{:?}", scene.notes);
+    assert_eq!(scene.instances.len(), 1);
+}
+
 /// Only the first of them was named.
 #[test]
 fn every_hidden_node_is_named_where_nothing_is_left() {

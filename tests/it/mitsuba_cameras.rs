@@ -28,6 +28,9 @@ fn cameras_are_mitsubas() {
     ));
     let back = r#"<transform name="to_world"><translate z="-4"/></transform>"#;
     assert!(!has_note(&camera("perspective", back), "cuts the scene"));
+    // The surface's depth is 0.001, within Mitsuba's default.
+    let touching = r#"<transform name="to_world"><translate z="-0.001"/></transform>"#;
+    assert!(!has_note(&camera("perspective", touching), "near_clip"));
     let clipped = camera("perspective", &format!(r#"{back}<float name="near_clip" value="4.1"/>"#));
     assert!(has_note(&clipped, "near_clip 4.1 cuts the scene"), "{:?}", clipped.notes);
 }

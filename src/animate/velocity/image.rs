@@ -7,7 +7,7 @@
 use super::{Seen, Target, VelocityMap, place_in, ray_through, seen_along, seen_at, target_in};
 use crate::geometry::Ray;
 use crate::integrator::{CameraRays, PathTracer, SpecularPath, SpecularVertex};
-use glam::{Vec2, Vec3A};
+use glam::{Vec2, Vec3, Vec3A};
 
 /// Another moment of a shot.
 struct Moment<'a> {
@@ -47,6 +47,8 @@ struct Image {
     path: SpecularPath,
     /// At its end.
     seen: Seen,
+    /// Where that is now; `None` where the scene does not say.
+    target: Option<Target>,
     /// Where it seems to be: along the camera ray, as far as the path is long.
     virtual_place: Target,
 }
@@ -59,24 +61,43 @@ impl Image {
         } else {
             Target::Direction(camera_ray.direction.into())
         };
-        Self { path, seen, virtual_place }
+        let target = target_in(tracer.world().scene(), &seen);
+        Self { path, seen, target, virtual_place }
     }
 
-    /// Its place in the picture of another moment. It is looked for from where the virtual place would be, which is it for mirrors
-    /// at rest, from where the surface has gone, and from where it was. Of a curved mirror's several images, one that lies much
-    /// further away than these is not the one that was seen.
+    /// Where it would seem to be, if its surfaces were plane mirrors and panes at rest, once what is seen has come to `target`.
+    fn moved_virtual_place(&self, target: Target) -> Target {
+        let shown = |motion: Vec3| Vec3::from(self.path.unfolded * Vec3A::from(motion));
+        match (self.virtual_place, self.target, target) {
+            (Target::Point(place), Some(Target::Point(from)), Target::Point(to)) => {
+                Target::Point(place + shown(to - from))
+            }
+            (Target::Direction(place), Some(Target::Direction(from)), Target::Direction(to)) => {
+                Target::Direction(place + shown(to - from))
+            }
+            (place, ..) => place,
+        }
+    }
+
+    /// Its place in the picture of another moment. It is looked for from where the virtual place would be, which is it for plane
+    /// mirrors at rest, from where the surface has gone, and from where it was. Of a curved mirror's several images, one that lies
+    /// much further away than these, or than a plane mirror's would have moved, is not the one that was seen.
     fn place_in(&self, other: &Moment, center: Vec2, of_surface: Option<Vec2>) -> Option<Vec2> {
         const NEAR_PX: f32 = 8.0;
         let target = target_in(other.tracer.world().scene(), &self.seen)?;
         let search = Search { other, vertices: &self.path.vertices, target };
-        let starts = [self.virtual_place.place(&other.camera), of_surface, Some(center)];
+        let virtual_place = self.moved_virtual_place(target).place(&other.camera);
+        let at_rest = self.virtual_place.place(&other.camera);
+        let starts = [virtual_place, of_surface, Some(center)];
         let nearest = starts
             .into_iter()
             .flatten()
             .filter_map(|place| search.aim(place))
             .min_by(|a, b| a.miss.length_squared().total_cmp(&b.miss.length_squared()))?;
         let place = search.solve(nearest)?;
-        let most = NEAR_PX.max(2.0 * nearest.place_px.distance(center));
+        // What stands nearest may be where nothing has moved, though what is seen has.
+        let own_motion_px = virtual_place.zip(at_rest).map_or(0.0, |(moved, rest)| moved.distance(rest));
+        let most = NEAR_PX.max(2.0 * nearest.place_px.distance(center).max(own_motion_px));
         (place.distance(nearest.place_px) <= most).then_some(place)
     }
 }

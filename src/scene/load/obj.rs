@@ -15,7 +15,8 @@ use self::libraries::{Libraries, UsedMaterials, report_unknown_materials};
 use self::parse::parse;
 use super::builder::{Builder, IfDark};
 use super::error::{LoadError, Place};
-use super::{LoadOptions, files, polygon};
+use super::polygon::{self, Covering};
+use super::{LoadOptions, files};
 use crate::scene::{Instance, MaterialId, Mesh, MeshId, Scene};
 use glam::{Affine3A, Vec2, Vec3};
 use std::cell::RefCell;
@@ -81,15 +82,20 @@ pub(super) fn read_into(
     let mut materials = UsedMaterials::new(&libraries);
     let mut placed = Vec::new();
     let mut sparse_faces = points_and_lines;
+    let mut rough_fans = 0;
     for model in &models {
-        let (mesh, skipped) = convert_mesh(model, path).map_err(|bad| not_finite(model, bad))?;
+        let Converted { mesh, skipped, rough_fans: fans } =
+            convert_mesh(model, path).map_err(|bad| not_finite(model, bad))?;
         sparse_faces += skipped;
+        rough_fans += fans;
         if !mesh.triangles.is_empty() {
             let material = materials.of(model, builder);
             placed.push((builder.add_mesh(mesh), material));
         }
     }
     note_leftovers(builder, path, sparse_faces, colors);
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    polygon::note_of_rough_fans(&name, rough_fans).into_iter().for_each(|note| builder.note(note));
     if placed.is_empty() {
         return Err(LoadError::invalid(path, "nothing to render: no face with three corners"));
     }
@@ -125,8 +131,16 @@ fn line_of_vertex(text: &str, position: Vec3) -> Option<usize> {
     text.lines().position(is_it).map(|place| place + 1)
 }
 
-/// Our mesh, and how many faces of fewer than three corners were skipped.
-fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), BadVertex> {
+/// Our mesh of a model.
+struct Converted {
+    mesh: Mesh,
+    /// Faces of fewer than three corners.
+    skipped: usize,
+    /// Faces that are [`Covering::RoughFan`].
+    rough_fans: usize,
+}
+
+fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<Converted, BadVertex> {
     let from = &model.mesh;
     let positions: Vec<Vec3> = from.positions.as_chunks::<3>().0.iter().copied().map(Vec3::from_array).collect();
     if let Some(&position) = positions.iter().find(|position| !position.is_finite()) {
@@ -151,7 +165,7 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), BadVe
         Vec::new()
     };
     let mut triangles = Vec::new();
-    let mut skipped = 0;
+    let (mut skipped, mut rough_fans) = (0, 0);
     if from.face_arities.is_empty() {
         triangles.extend_from_slice(from.indices.as_chunks::<3>().0);
     } else {
@@ -164,7 +178,8 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), BadVe
             if face.len() < 3 {
                 skipped += 1;
             } else if face.iter().all(|&index| (index as usize) < positions.len()) {
-                polygon::triangulate(&positions, face, &mut triangles);
+                let covering = polygon::triangulate(&positions, face, &mut triangles);
+                rough_fans += usize::from(covering == Covering::RoughFan);
             }
         }
     }
@@ -174,5 +189,6 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), BadVe
     } else {
         model.name.clone()
     };
-    Ok((Mesh { name, positions, normals, uvs, colors, triangles, ..Mesh::default() }, skipped))
+    let mesh = Mesh { name, positions, normals, uvs, colors, triangles, ..Mesh::default() };
+    Ok(Converted { mesh, skipped, rough_fans })
 }

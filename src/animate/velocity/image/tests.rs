@@ -181,6 +181,27 @@ fn a_glass_ball_shows_the_same_marks_where_its_map_says() {
     assert!(share > 0.95 && count > 500, "{share} of {count}");
 }
 
+/// A ball behind a camera at rest, seen in a mirror at rest, that moves far in a frame.
+#[test]
+fn a_mirror_at_rest_shows_fast_things() {
+    let at = |frame: f32| Vec3::new(8.0 * frame, 0.0, 12.0);
+    let tracers = frames(|frame| {
+        let mut scene = empty(Camera::pinhole(Vec3::new(0.0, 0.0, 9.0), Vec3::NEG_Z, Vec3::Y, 60.0));
+        add_square(&mut scene, Affine3A::from_scale(Vec3::splat(20.0)), mirror());
+        add_ball(&mut scene, at(frame), 2.0, diffuse());
+        scene
+    });
+    // In the mirror's plane z = 0 it stands at a depth of 9 + 12, less its radius at its middle.
+    let px_per_tangent = SIZE as f32 / 2.0 / 30.0_f32.to_radians().tan();
+    let expected_px = 8.0 / 19.0 * px_per_tangent;
+    let map = map_of(&tracers);
+    let beside_the_middle = (SIZE / 2 * SIZE + SIZE / 2) as usize;
+    for (motion, side) in [(map.to_next[beside_the_middle], 1.0), (map.to_previous[beside_the_middle], -1.0)] {
+        let expected = Vec2::new(side * expected_px, 0.0);
+        assert!(expected_px > 16.0 && motion.distance(expected) < 0.1, "{motion}, not {expected}");
+    }
+}
+
 /// A pane at rest changes no velocity of what is behind it.
 #[test]
 fn a_pane_shows_what_is_behind_it() {

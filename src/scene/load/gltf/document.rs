@@ -54,6 +54,7 @@ pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<:
     for name in used.into_iter().filter(|name| !KNOWN.contains(name)) {
         let instead = match name {
             "KHR_materials_variants" => "the default variant is rendered",
+            "EXT_mesh_gpu_instancing" => "a mesh that it repeats is rendered once, at its node",
             _ => "it is left out",
         };
         builder.note(format!("{name} is not supported: {instead}."));

@@ -19,7 +19,7 @@ mod transform;
 
 use super::LoadOptions;
 use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
-use super::error::{LoadError, Place, suggestion};
+use super::error::{LoadError, suggestion};
 use crate::scene::{Alpha, ColorInput, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
 use element::{Element, Given};
 use glam::{Affine3A, Vec3};
@@ -92,7 +92,7 @@ struct Reader {
     /// Whether the file is of version 2 or later: other defaults, and skies with their zenith along +z.
     since_2: bool,
     /// Where the first camera stands in the file, and its clipping distances.
-    clips: Option<(Place, [f32; 2])>,
+    clips: Option<sensor::Clips>,
 }
 
 /// What a shape has on it, of its own or by reference.

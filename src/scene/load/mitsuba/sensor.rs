@@ -2,7 +2,7 @@
 
 use super::super::builder::NamedCamera;
 use super::super::default_view;
-use super::super::error::{LoadError, names_of};
+use super::super::error::{LoadError, Place, names_of};
 use super::super::framing::{FilmAxis, Framing, LONGEST_SIDE};
 use super::Reader;
 use super::element::{Element, canonical};
@@ -12,6 +12,15 @@ use glam::{Affine3A, Vec2, Vec3};
 
 /// Mitsuba's default.
 const FAR_CLIP: f32 = 1e4;
+
+/// Depths along a camera's axis before and behind which Mitsuba shows nothing, in scene units, where the file gives them.
+pub(super) struct Clips {
+    place: Place,
+    /// Mitsuba's default of 0.01 leaves out nothing that anyone would look for.
+    near: Option<f32>,
+    /// [`FAR_CLIP`] if the file gives none.
+    far: Option<f32>,
+}
 
 /// How a sensor's rays run.
 #[derive(Clone, Copy)]
@@ -60,8 +69,8 @@ impl Reader {
             Aperture::Pinhole => 0.0,
             Aperture::Lens => sensor.float_or("apertureradius", 0.0)?.max(0.0),
         };
-        let clips = [sensor.float_or("nearclip", 0.01)?, sensor.float_or("farclip", FAR_CLIP)?];
-        let focus_distance = sensor.float_or("focusdistance", clips[1])?.max(1e-6);
+        let clips = Clips { place: sensor.place(), near: sensor.float("nearclip")?, far: sensor.float("farclip")? };
+        let focus_distance = sensor.float_or("focusdistance", clips.far.unwrap_or(FAR_CLIP))?.max(1e-6);
         sensor.ignore(&["shutteropen", "shutterclose"]);
         sensor.tagged("sampler").count();
         self.note_unused(&format!("sensor \"{kind}\""), sensor);
@@ -79,7 +88,7 @@ impl Reader {
             ..Camera::placed(to_world.translation.into(), axes.forward, axes.up, view.projection)
         };
         if is_first {
-            self.clips = Some((sensor.place(), clips));
+            self.clips = Some(clips);
         }
         self.builder.cameras.push(NamedCamera { name: sensor.name(), holder: None, camera, framing });
         Ok(())
@@ -87,7 +96,7 @@ impl Reader {
 
     /// Names clipping distances of the first camera that would cut something off, once everything is there.
     pub(super) fn note_clips(&mut self) {
-        let (Some((place, [near, far])), Some(first)) = (self.clips.take(), self.builder.cameras.first()) else {
+        let (Some(Clips { place, near, far }), Some(first)) = (self.clips.take(), self.builder.cameras.first()) else {
             return;
         };
         let bounds = default_view::bounds(&self.builder.meshes, &self.builder.instances, &self.builder.spheres);
@@ -102,9 +111,11 @@ impl Reader {
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), depth| (low.min(depth), high.max(depth)));
         // From inside a scene, what lies within a hundredth of it is seldom anything.
         let least = if nearest > 0.0 { nearest } else { 0.01 * size.length() };
-        let cuts_near = farthest > 0.0 && near > least;
-        for (cuts, name, distance) in [(cuts_near, "near_clip", near), (far < farthest, "far_clip", far)] {
-            if cuts {
+        let near = near.filter(|near| farthest > 0.0 && *near > least);
+        let far_name = if far.is_some() { "far_clip" } else { "Mitsuba's default far_clip" };
+        let far = Some(far.unwrap_or(FAR_CLIP)).filter(|far| *far < farthest);
+        for (name, distance) in [("near_clip", near), (far_name, far)] {
+            if let Some(distance) = distance {
                 self.builder.note(format!("{place}: {name} {distance} cuts the scene: here nothing is cut."));
             }
         }

@@ -9,7 +9,8 @@ mod header;
 mod strips;
 
 use super::error::LoadError;
-use super::{files, polygon};
+use super::files;
+use super::polygon::{self, Covering};
 use crate::scene::Mesh;
 use body::Values;
 use glam::{Vec2, Vec3};
@@ -49,12 +50,13 @@ pub(super) fn read(path: &Path) -> Result<Loaded, LoadError> {
     if let Some(index) = polygons.indices.iter().find(|&&index| index as usize >= vertices) {
         return Err(LoadError::invalid(path, format_args!("a face uses vertex {index}, but there are {vertices}")));
     }
-    polygons.triangulate(positions, triangles);
+    let rough_fans = polygons.triangulate(positions, triangles);
     if triangles.is_empty() {
         return Err(LoadError::invalid(path, "nothing to render: no face with three corners"));
     }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    notes.extend(polygon::note_of_rough_fans(&name, rough_fans));
     if !unused.is_empty() {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
         notes.push(format!("{name}: not used: {}.", unused.join(", ")));
     }
     Ok(Loaded { mesh, notes })
@@ -71,19 +73,23 @@ struct Polygons {
 }
 
 impl Polygons {
-    fn triangulate(&self, positions: &[Vec3], triangles: &mut Vec<[u32; 3]>) {
+    /// Adds the triangles of all faces; how many of these are [`Covering::RoughFan`].
+    fn triangulate(&self, positions: &[Vec3], triangles: &mut Vec<[u32; 3]>) -> usize {
         if !self.has_other_polygons {
             triangles.extend_from_slice(self.indices.as_chunks::<3>().0);
-            return;
+            return 0;
         }
+        let mut rough_fans = 0;
         let mut rest = self.indices.as_slice();
         for &size in &self.sizes {
-            let Some((face, behind)) = rest.split_at_checked(size as usize) else { return };
+            let Some((face, behind)) = rest.split_at_checked(size as usize) else { break };
             rest = behind;
             if size >= 3 {
-                polygon::triangulate(positions, face, triangles);
+                let covering = polygon::triangulate(positions, face, triangles);
+                rough_fans += usize::from(covering == Covering::RoughFan);
             }
         }
+        rough_fans
     }
 }
 
