@@ -5,8 +5,8 @@ use glam::{DVec2, DVec3, Vec3};
 mod corner_grid;
 mod ears;
 
-/// Ear clipping is quadratic at worst: larger polygons get a fan.
-const MOST_CORNERS_TO_CLIP: usize = 100_000;
+/// Ear clipping is nearly quadratic: larger polygons get a fan.
+const MOST_CORNERS_TO_CLIP: usize = 50_000;
 
 /// How a polygon's area was covered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
