@@ -3,7 +3,7 @@
 //! `path` holds the life of one sample, `path_packet` how several are followed at once, `camera` where they start, `around_camera` in which
 //! volumes, `shading` what a surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand,
 //! `media` what a ray travels in, `light_probes` what light comes where, `prune` which light is left to chance, `thin_sheets` what clear panes
-//! let through, `specular` what mirrors and glass show, `small_things` where lamps are that samples may pass by.
+//! let through, `specular` what mirrors and glass show, `small_things` what samples may pass by.
 
 mod around_camera;
 mod camera;

@@ -7,6 +7,7 @@
 
 mod border;
 mod lit;
+mod scatter;
 mod shares;
 mod spots;
 mod strip;
@@ -16,6 +17,7 @@ use super::camera::CameraAt;
 use crate::film::{KnownThings, opponent};
 use crate::geometry::Facet;
 use crate::light::LampPart;
+use crate::sampler::{BlockKey, Half, Pixel, Sequence};
 use glam::{Vec2, Vec3};
 use lit::BrightSpot;
 use shares::{Piece, Shares};
@@ -34,6 +36,8 @@ const MOST_MOMENTS: usize = 64;
 const LENS_POINTS_OF_A_MOMENT: usize = 4;
 /// With fewer it is left to chance.
 const FEWEST_MOMENTS: usize = 8;
+/// Spots of lit things over the triangles and spheres that are looked at, at most.
+const SPOTS_A_FACET: usize = 4;
 
 /// What is looked for.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -138,7 +142,11 @@ impl PathTracer {
         // Where things go is told by where they are half a step later, which is before the shutter closes.
         let step = 0.5 / moment.of as f32;
         let [camera, camera_later] = [moment.time, moment.time + step].map(|time| self.camera.at(time));
-        let mut spots = Spots::new(camera, camera_later, step, self.settings.film_area());
+        let most = match kind {
+            Kind::Lamps => MOST_RAYS,
+            Kind::Lit => SPOTS_A_FACET * self.most_parts(kind),
+        };
+        let mut spots = Spots::new(camera, camera_later, step, self.settings.film_area(), most);
         let [now, later] = [moment.time, moment.time + step].map(|time| self.parts_at(kind, moment.which, time));
         now.zip(later).for_each(|(part, later)| spots.add(&part, later.facet.center()));
         spots.found
@@ -187,6 +195,18 @@ impl PathTracer {
         let ray = camera.ray(position_px, lens);
         let distance = (spot.position - Vec3::from(ray.origin)).dot(Vec3::from(ray.direction)) - spot.radius;
         (distance > 0.0 && !self.world.occluded(&ray, AS_FAR_AS * distance)).then_some(position_px)
+    }
+}
+
+/// Names the random numbers of a probe at a moment.
+fn probe_key(stream: u64, number: usize, moment: usize) -> BlockKey {
+    BlockKey {
+        seed: stream,
+        pixel: Pixel { x: number as u32, y: moment as u32 },
+        half: Half::A,
+        level: 0,
+        log2_samples: 4,
+        sequence: Sequence::PerPixel,
     }
 }
 

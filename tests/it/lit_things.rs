@@ -99,7 +99,7 @@ fn what_neighbours_tell_of_is_left_to_them() {
                 add_rectangle(scene, corner, 0.04 * Vec3::X, 0.04 * Vec3::Y, WHITE);
             }
         }),
-        ("a lamp that alpha covers", true, &covered),
+        ("a lamp that alpha covers", false, &covered),
         ("a black ball before the sky", true, &|scene| {
             scene.environment = constant_environment(1.0);
             add_sphere(scene, place, 0.012, BLACK);
@@ -112,6 +112,26 @@ fn what_neighbours_tell_of_is_left_to_them() {
     for (name, is_known, add) in cases {
         assert_eq!(known(&tracer_of(add)).is_some(), is_known, "{name}");
     }
+}
+
+/// White balls among as many black ones as there are paths for: each is asked for itself.
+#[test]
+fn unlike_things_are_told_apart() {
+    let place = |number: u32| Vec3::new(-0.7 + 0.09 * (number % 16) as f32, -0.7 + 0.09 * (number / 16) as f32, 0.0);
+    let light = |black_too: bool| {
+        let tracer = tracer_of(|scene| {
+            for number in 0..256 {
+                let material = if number % 13 == 4 { WHITE } else { BLACK };
+                if black_too || material == WHITE {
+                    add_sphere(scene, place(number), 0.004, material);
+                }
+            }
+        });
+        let [_, light] = known(&tracer).expect("white balls");
+        light
+    };
+    let (alone, among_black) = (light(false), light(true));
+    assert!((among_black / alone - 1.0).abs() < 0.15, "{among_black} for {alone}");
 }
 
 /// Forty balls of dust in the sun, of which renders asked for 8 left out 30 ± 1 % of the light, and those asked for 1 12.5 ± 1.6 %.
@@ -145,6 +165,20 @@ fn light_beside_the_film_is_not_missed() {
             assert!((sum / even - 1.0).abs() < 0.2, "{seed} {crop:?}: {sum} for {even}");
         }
     }
+    // A wall that ends beside the film, as bright as the sky behind it.
+    let wall_ends_at = |edge_px: f32, reflectance: f32| {
+        let mut scene = empty_scene();
+        add_material(&mut scene, diffuse(reflectance), Vec3::ZERO);
+        scene.environment = constant_environment(1.0);
+        let corner = Vec3::new(-9.0, -9.0, 0.0);
+        add_rectangle(&mut scene, corner, Vec3::new(9.0 + edge_px * pixel, 0.0, 0.0), 18.0 * Vec3::Y, WHITE);
+        let settings = TraceSettings { filter: PixelFilter::Gaussian, ..trace_settings(SIDE, SIDE, 1) };
+        PathTracer::new(Arc::new(scene), settings).known_things().is_some()
+    };
+    let beside = 0.5 * SIDE as f32 + 0.2;
+    assert!(!wall_ends_at(beside, 0.9), "as bright as the sky");
+    assert!(wall_ends_at(beside, 0.1), "darker than the sky");
+
     let boxed = TraceSettings { filter: PixelFilter::Box, ..trace_settings(SIDE, SIDE, 1) };
     assert!(PathTracer::new(scene, boxed).known_things().is_none(), "a box reaches nowhere");
 }

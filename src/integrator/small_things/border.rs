@@ -1,12 +1,13 @@
 //! Light right beyond the film's border, into which the pixel filter of the outermost pixels reaches.
 //!
 //! No pixel of the film is covered by it, so that nothing in the picture tells of what few samples meet: of a ball of light half a pixel beyond,
-//! six renders in eight found nothing and stopped at 16 samples, 77 times above threshold. Only light that cameras see straight is looked for.
+//! six renders in eight found nothing and stopped at 16 samples, 77 times above threshold. Only lamps and the sky are looked for, that cameras see straight.
 
-use super::lit::LEAST_CONTRAST;
+use super::probe_key;
+use super::scatter::{LEAST_CONTRAST, Scatter};
 use super::shares::{Piece, Shares};
 use crate::integrator::{Crop, PathTracer};
-use crate::sampler::{BlockKey, Half, Pixel, Purpose, Sequence};
+use crate::sampler::Purpose;
 use glam::Vec2;
 use rayon::prelude::*;
 
@@ -15,6 +16,8 @@ const REACH_PX: f32 = 1.0;
 /// Steps of a pixel across the border, and along it. In half a pixel across, a filter's tail falls to a tenth.
 const ACROSS: u32 = 4;
 const ALONG: u32 = 2;
+/// Paths that ask how bright it is where light is seen straight, beyond and inside.
+const PATHS: u32 = 4;
 /// Makes the random numbers differ from those of pictures, whatever their seed.
 const STREAM: u64 = 0x626f_7264_6572_0001;
 
@@ -32,15 +35,8 @@ impl PathTracer {
             return;
         }
         let places = places_beyond(self.settings.film_area());
-        let differences: Vec<f32> = places
-            .par_iter()
-            .enumerate()
-            .map(|(number, Beyond { place_px, inside_px })| {
-                let [there, inside] = [*place_px, *inside_px].map(|place_px| self.light_straight_at(place_px, number));
-                let difference = (there - inside).abs();
-                if difference > LEAST_CONTRAST * inside { difference } else { 0.0 }
-            })
-            .collect();
+        let differences: Vec<f32> =
+            places.par_iter().enumerate().map(|(number, beyond)| self.difference_beyond(beyond, number)).collect();
         for (Beyond { place_px, .. }, luminance) in places.into_iter().zip(differences) {
             if luminance > 0.0 {
                 shares.add(&Piece {
@@ -55,21 +51,28 @@ impl PathTracer {
         }
     }
 
-    /// Luminance of the lamp or the sky that is seen at a place in the picture, scene units: from points of the lens, and at moments, that
-    /// change from one number to the next.
-    fn light_straight_at(&self, place_px: Vec2, number: usize) -> f32 {
-        let key = BlockKey {
-            seed: STREAM,
-            pixel: Pixel { x: 0, y: 0 },
-            half: Half::A,
-            level: 0,
-            log2_samples: 30,
-            sequence: Sequence::PerPixel,
+    /// By how much the luminance beyond differs from that inside, scene units; 0 where that is little, or no light is seen straight. From points
+    /// of the lens, and at moments, that change from one number to the next.
+    fn difference_beyond(&self, Beyond { place_px, inside_px }: &Beyond, number: usize) -> f32 {
+        let key = probe_key(STREAM, number, 0);
+        let ray_of = |place_px: Vec2, index: u32| {
+            let sample = key.sample(index);
+            let [.., lens_u, lens_v] = sample.draw(Purpose::Camera);
+            let time = if self.moves { sample.draw(Purpose::Time)[0] } else { 0.0 };
+            self.camera.at(time).ray(place_px, [lens_u, lens_v])
         };
-        let sample = key.sample(number as u32);
-        let [.., lens_u, lens_v] = sample.draw(Purpose::Camera);
-        let time = if self.moves { sample.draw(Purpose::Time)[0] } else { 0.0 };
-        self.luminance_of(self.light_straight_along(self.camera.at(time).ray(place_px, [lens_u, lens_v]), sample))
+        let straight =
+            |place_px: Vec2| self.luminance_of(self.light_straight_along(ray_of(place_px, 0), key.sample(0)));
+        let [there, inside] = [straight(*place_px), straight(*inside_px)];
+        if (there - inside).abs() <= LEAST_CONTRAST * inside {
+            return 0.0;
+        }
+        // What has no light of its own may be as bright.
+        let seen = |index: u32, place_px: Vec2| {
+            self.luminance_of(self.trace_path(ray_of(place_px, index), key.sample(index)).radiance)
+        };
+        let there: Scatter = (0..PATHS).map(|index| seen(index, *place_px)).collect();
+        there.difference(&(PATHS..2 * PATHS).map(|index| seen(index, *inside_px)).collect())
     }
 }
 

@@ -2,13 +2,13 @@
 //!
 //! Nothing says how bright they are but paths to them. Not for pieces of something larger, of which neighbouring pixels tell.
 
+use super::scatter::Scatter;
 use super::spots::Spot;
-use super::{Moment, Part, Shine};
+use super::{Moment, Part, Shine, probe_key};
 use crate::geometry::{Facet, Ray, World};
 use crate::integrator::PathTracer;
 use crate::integrator::camera::CameraAt;
-use crate::sampler::{BlockKey, Half, Pixel, Sample, Sequence};
-use crate::scene::{Scene, SpherePlace};
+use crate::scene::{Alpha, Scene, SpherePlace};
 use glam::Vec2;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
@@ -28,10 +28,6 @@ const MOST_ALIKE: usize = 2;
 const PATHS: u32 = 4;
 /// Such paths over the film's pixels, at most: a thirtieth of what their first samples take.
 const PATHS_A_PIXEL: f32 = 0.5;
-/// What differs by less from what is around it, over that, is left to chance: of a sixteenth of a pixel sixteen samples would scatter by 2 %.
-pub(super) const LEAST_CONTRAST: f32 = 0.3;
-/// Or by fewer standard errors of these paths.
-const LEAST_ERRORS: f32 = 2.0;
 /// Makes the random numbers differ from those of pictures, whatever their seed.
 const STREAM: u64 = 0x6c69_745f_7370_6f74;
 
@@ -47,6 +43,7 @@ pub(super) fn most_facets(pixels: usize) -> usize {
 }
 
 /// Pieces of objects that do not shine evenly, in one order at any time, of those with the fewest first. `is_asked`: for what moves, or does not.
+/// Not of what alpha covers in part: a ray meets all of it or nothing.
 pub(super) fn parts_at(
     world: &World,
     most: usize,
@@ -54,7 +51,10 @@ pub(super) fn parts_at(
     is_asked: impl Fn(bool) -> bool,
 ) -> impl Iterator<Item = Part> {
     let mut objects: Vec<Object> = objects_of(world.scene())
-        .filter(|object| is_asked(object.moves) && world.material(object.number).even_emission().is_none())
+        .filter(|object| {
+            let material = world.material(object.number);
+            is_asked(object.moves) && material.even_emission().is_none() && material.alpha == Alpha::Opaque
+        })
         .collect();
     objects.sort_unstable();
     objects.into_iter().flat_map(move |object| facets_of(world, object, time)).take(most)
@@ -99,13 +99,13 @@ impl PathTracer {
     pub(super) fn bright_spots(&self, camera: &CameraAt<'_>, spots: Vec<Spot>, moment: &Moment) -> Vec<BrightSpot> {
         let alone: Vec<Spot> = spots.into_par_iter().filter(|spot| self.is_alone(camera, spot)).collect();
         let affordable = (PATHS_A_PIXEL * self.settings.film_area().pixels() as f32) as usize / moment.of;
-        // Neighbours in the list are mostly neighbours in the picture.
         let alike = (alone.len() * (PATHS + AROUND) as usize).div_ceil(affordable.max(1)).max(1);
-        let asked: Vec<usize> = (0..alone.len()).step_by(alike).collect();
+        let asked = asked_for(&alone, alike);
+        let luminance_of = |number: usize| self.luminance_at(camera, &alone[number], number, moment);
         let luminances: Vec<f32> =
-            asked.into_par_iter().map(|number| self.luminance_at(camera, &alone[number], number, moment)).collect();
-        let bright = |(number, spot)| BrightSpot { spot, luminance: luminances[number / alike] };
-        alone.into_iter().enumerate().map(bright).filter(|spot| spot.luminance > 0.0).collect()
+            (0..alone.len()).into_par_iter().map(|at| if asked[at] == at { luminance_of(at) } else { 0.0 }).collect();
+        let bright = |(spot, number): (Spot, usize)| BrightSpot { spot, luminance: luminances[number] };
+        alone.into_iter().zip(asked).map(bright).filter(|spot| spot.luminance > 0.0).collect()
     }
 
     /// Whether a spot is of a lamp, or is seen, and what is around it is of other things and materials.
@@ -131,24 +131,27 @@ impl PathTracer {
             Shine::Of(object) => object,
         };
         let Some(place_px) = camera.project(spot.position) else { return 0.0 };
-        let key = BlockKey {
-            seed: STREAM,
-            pixel: Pixel { x: number as u32, y: moment.number as u32 },
-            half: Half::A,
-            level: 0,
-            log2_samples: 4,
-            sequence: Sequence::PerPixel,
-        };
-        let luminance = |ray: Ray, sample: Sample| self.luminance_of(self.trace_path(ray, sample).radiance);
+        let key = probe_key(STREAM, number, moment.number);
+        let luminance = |ray: Ray, index: u32| self.luminance_of(self.trace_path(ray, key.sample(index)).radiance);
         let own = camera.ray_through(place_px);
-        let own: Scatter = (0..PATHS).map(|index| luminance(own, key.sample(index))).collect();
+        let own: Scatter = (0..PATHS).map(|index| luminance(own, index)).collect();
         let others = (PATHS..).zip(around(camera, spot)).filter(|(_, ray)| !self.meets(ray, object));
-        let others: Scatter = others.map(|(index, ray)| luminance(ray, key.sample(index))).collect();
-        let difference = (own.mean() - others.mean()).abs();
-        let error = (own.variance_of_mean() + others.variance_of_mean()).sqrt();
-        let is_seen = difference >= LEAST_CONTRAST * others.mean() && difference >= LEAST_ERRORS * error;
-        if is_seen { difference } else { 0.0 }
+        own.difference(&others.map(|(index, ray)| luminance(ray, index)).collect())
     }
+}
+
+/// For each spot the one whose luminance it has: of those of one object every so many are asked, and their next neighbours are like them.
+fn asked_for(spots: &[Spot], alike: usize) -> Vec<usize> {
+    let (mut asked, mut latest) = (Vec::with_capacity(spots.len()), 0);
+    for (number, spot) in spots.iter().enumerate() {
+        let is_like_latest = match (spot.shine, spots[latest].shine) {
+            (Shine::Of(object), Shine::Of(other)) => object == other && number - latest < alike,
+            _ => false,
+        };
+        latest = if is_like_latest { latest } else { number };
+        asked.push(latest);
+    }
+    asked
 }
 
 /// Rays to places around a spot. None is level with it or above it: many wires go that way.
@@ -159,32 +162,4 @@ fn around<'a>(camera: &'a CameraAt<'_>, spot: &Spot) -> impl Iterator<Item = Ray
     place_px.into_iter().flat_map(move |place_px| {
         angles.clone().map(move |angle| camera.ray_through(place_px + away_px * Vec2::from_angle(angle)))
     })
-}
-
-/// How numbers scatter.
-#[derive(Default)]
-struct Scatter {
-    count: f32,
-    sum: f32,
-    squares: f32,
-}
-
-impl FromIterator<f32> for Scatter {
-    fn from_iter<I: IntoIterator<Item = f32>>(numbers: I) -> Self {
-        numbers.into_iter().fold(Self::default(), |Self { count, sum, squares }, number| Self {
-            count: count + 1.0,
-            sum: sum + number,
-            squares: squares + number * number,
-        })
-    }
-}
-
-impl Scatter {
-    fn mean(&self) -> f32 {
-        self.sum / self.count.max(1.0)
-    }
-
-    fn variance_of_mean(&self) -> f32 {
-        (self.squares / self.count.max(1.0) - self.mean().powi(2)).max(0.0) / (self.count - 1.0).max(1.0)
-    }
 }

@@ -3,7 +3,7 @@
 use super::super::Crop;
 use super::super::camera::CameraAt;
 use super::strip::Strip;
-use super::{MOST_RAYS, Part, Shine};
+use super::{Part, Shine};
 use crate::geometry::Facet;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
@@ -56,6 +56,7 @@ pub(super) struct Spots<'a> {
     step: f32,
     /// Outside of which nothing is looked for.
     area: Crop,
+    most: usize,
     pub(super) found: Vec<Spot>,
 }
 
@@ -80,14 +81,14 @@ impl Around {
 }
 
 impl<'a> Spots<'a> {
-    /// None yet. `later`: the camera `step` later.
-    pub(super) fn new(camera: CameraAt<'a>, later: CameraAt<'a>, step: f32, area: Crop) -> Self {
-        Self { camera, later, step, area, found: Vec::new() }
+    /// None yet. `later`: the camera `step` later. `most`: how many there may be.
+    pub(super) fn new(camera: CameraAt<'a>, later: CameraAt<'a>, step: f32, area: Crop, most: usize) -> Self {
+        Self { camera, later, step, area, most, found: Vec::new() }
     }
 
     /// Adds what is small of a part. `later`: its middle, when the camera is there.
     pub(super) fn add(&mut self, Part { facet, front, shine }: &Part, later: Vec3) {
-        if self.found.len() >= MOST_RAYS {
+        if self.found.len() >= self.most {
             return;
         }
         let center = facet.center();
@@ -153,7 +154,7 @@ impl<'a> Spots<'a> {
         let [a, b, c] = corners.map(|corner| corner.as_dvec3());
         let normal = (b - a).cross(c - a);
         let (longest_px, border_px) = (SLICE * small_px.max(1.0), self.border_px(&around).max_element());
-        let most = MOST_RAYS - self.found.len();
+        let most = self.most - self.found.len();
         for slice in strip.slices(self.area, f64::from(longest_px), f64::from(border_px)).take(most) {
             let ray = self.camera.ray_through(slice.place_px.as_vec2());
             let (origin, direction) = (Vec3::from(ray.origin).as_dvec3(), Vec3::from(ray.direction).as_dvec3());
