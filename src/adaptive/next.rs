@@ -91,7 +91,7 @@ impl Loop<'_> {
     /// that is denoised.
     pub(super) fn plans_without_a_look(&mut self) -> Result<bool, JudgeError> {
         let left = self.left_of_budget();
-        if let Some(plan) = self.plan_to_meet_small_things(left) {
+        if let Some(plan) = self.plan_to_meet_lamps(left) {
             self.enter(plan);
             return Ok(true);
         }
@@ -140,7 +140,7 @@ impl Loop<'_> {
         self.samples_to_meet_lamps.get_or_init(of_lamps).as_deref()
     }
 
-    fn plan_to_meet_small_things(&self, left: u64) -> Option<SamplePlan> {
+    fn plan_to_meet_lamps(&self, left: u64) -> Option<SamplePlan> {
         let wanted = self.samples_to_meet_lamps()?;
         plan_up_to(&self.state.film, |pixel| wanted[pixel]).non_empty().filter(|plan| plan.samples() <= left)
     }

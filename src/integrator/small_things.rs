@@ -198,7 +198,7 @@ impl PathTracer {
     }
 }
 
-/// Names the random numbers of a probe at a moment.
+/// Names the random numbers of the paths that ask how bright something is at a moment, at most 16 of them.
 fn probe_key(stream: u64, number: usize, moment: usize) -> BlockKey {
     BlockKey {
         seed: stream,
