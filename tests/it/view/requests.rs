@@ -84,8 +84,9 @@ fn a_picture_that_was_asked_for_is_saved_whatever_comes_then() {
     // Longer than a batch, in the middle of the look.
     std::thread::sleep(Duration::from_millis(60));
     viewer.send(&orbit());
-    viewer.status("the picture", |status| status["note"] == "saved cornell-box-1.png");
-    assert!(folder.path().join("cornell-box-1.png").exists());
+    // The note of it may be gone with the movement before anybody is told.
+    let picture = folder.path().join("cornell-box-1.png");
+    viewer.status("the picture", |_| picture.exists());
 }
 
 /// A camera with nothing before its middle turns about what else it sees, from the first movement on and right after it has come
