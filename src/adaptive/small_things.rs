@@ -28,7 +28,7 @@ const MOST_OF_PILOT: f64 = 0.5;
 ///
 /// By the scene and the limits alone: a render that goes on asks for what it has.
 pub(super) fn samples_to_meet(shares: &[f32], limits: &Limits) -> Option<Vec<u32>> {
-    let pilot = f64::from(limits.pilot_samples);
+    let pilot = f64::from(limits.pilot());
     let budget = limits.mean_samples.map_or(f64::INFINITY, |mean| f64::from(mean) - pilot);
     let affordable = budget.min(MOST_OF_PILOT * pilot) * shares.len() as f64;
     let mut meetings = MEETINGS;

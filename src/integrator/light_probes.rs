@@ -5,7 +5,7 @@ use super::thin_sheets::MOST_SHEETS;
 use super::{CameraSample, PathTracer};
 use crate::geometry::{Ray, SurfacePoint};
 use crate::light::{LightProbe, LightSample};
-use crate::sampler::{BlockKey, Half, Pixel, Purpose, Sample, Sequence};
+use crate::sampler::{BlockKey, Pixel, Purpose, Sample};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -39,15 +39,7 @@ impl PathTracer {
     /// Surfaces that one scout comes to. It walks like a path, whatever light it would carry.
     fn places_of(&self, scout: u32) -> Vec<Place> {
         let cell = Pixel { x: scout % SCOUTS, y: scout / SCOUTS };
-        let key = BlockKey {
-            seed: SCOUTS_STREAM,
-            pixel: cell,
-            half: Half::A,
-            level: 0,
-            log2_samples: 0,
-            sequence: Sequence::PerPixel,
-        };
-        let sample = key.sample(0);
+        let sample = BlockKey::of_probe(SCOUTS_STREAM, cell).sample(0);
         let [x, y, lens_u, lens_v] = sample.draw(Purpose::Camera);
         let size_px = Vec2::new(self.settings.width as f32, self.settings.height as f32);
         let mut ray = self.camera.ray(&CameraSample {

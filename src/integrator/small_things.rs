@@ -7,7 +7,7 @@
 
 mod border;
 mod lit;
-mod scatter;
+mod luminances;
 mod shares;
 mod spots;
 mod strip;
@@ -17,7 +17,6 @@ use super::camera::CameraAt;
 use crate::film::{KnownThings, opponent};
 use crate::geometry::Facet;
 use crate::light::LampPart;
-use crate::sampler::{BlockKey, Half, Pixel, Sequence};
 use glam::{Vec2, Vec3};
 use lit::BrightSpot;
 use shares::{Piece, Shares};
@@ -195,18 +194,6 @@ impl PathTracer {
         let ray = camera.ray(position_px, lens);
         let distance = (spot.position - Vec3::from(ray.origin)).dot(Vec3::from(ray.direction)) - spot.radius;
         (distance > 0.0 && !self.world.occluded(&ray, AS_FAR_AS * distance)).then_some(position_px)
-    }
-}
-
-/// Names the random numbers of the paths that ask how bright something is at a moment, at most 16 of them.
-fn probe_key(stream: u64, number: usize, moment: usize) -> BlockKey {
-    BlockKey {
-        seed: stream,
-        pixel: Pixel { x: number as u32, y: moment as u32 },
-        half: Half::A,
-        level: 0,
-        log2_samples: 4,
-        sequence: Sequence::PerPixel,
     }
 }
 

@@ -141,6 +141,11 @@ pub struct Sample {
 const MOST_TILE_BITS: u32 = 7;
 
 impl BlockKey {
+    /// Names the samples, at most 16, of what is asked before a render. `stream`: a seed of its own, so that they are not those of pictures.
+    pub fn of_probe(stream: u64, number: Pixel) -> Self {
+        Self { seed: stream, pixel: number, half: Half::A, level: 0, log2_samples: 4, sequence: Sequence::PerPixel }
+    }
+
     /// Hash of what the block's scrambling depends on.
     fn hash(self) -> u32 {
         let pixel = match self.sequence {

@@ -1,13 +1,13 @@
 //! Light right beyond the film's border, into which the pixel filter of the outermost pixels reaches.
 //!
 //! No pixel of the film is covered by it, so that nothing in the picture tells of what few samples meet: of a ball of light half a pixel beyond,
-//! six renders in eight found nothing and stopped at 16 samples, 77 times above threshold. Only lamps and the sky are looked for, that cameras see straight.
+//! six renders in eight found nothing and stopped at 16 samples, 77 times above threshold. Only lamps and the sky are looked for, that cameras see
+//! straight; what they are compared with may be lit.
 
-use super::probe_key;
-use super::scatter::{LEAST_CONTRAST, Scatter};
+use super::luminances::{LEAST_CONTRAST, Luminances};
 use super::shares::{Piece, Shares};
 use crate::integrator::{Crop, PathTracer};
-use crate::sampler::Purpose;
+use crate::sampler::{BlockKey, Pixel, Purpose};
 use glam::Vec2;
 use rayon::prelude::*;
 
@@ -54,7 +54,7 @@ impl PathTracer {
     /// By how much the luminance beyond differs from that inside, scene units; 0 where that is little, or no light is seen straight. From points
     /// of the lens, and at moments, that change from one number to the next.
     fn difference_beyond(&self, Beyond { place_px, inside_px }: &Beyond, number: usize) -> f32 {
-        let key = probe_key(STREAM, number, 0);
+        let key = BlockKey::of_probe(STREAM, Pixel { x: number as u32, y: 0 });
         let ray_of = |place_px: Vec2, index: u32| {
             let sample = key.sample(index);
             let [.., lens_u, lens_v] = sample.draw(Purpose::Camera);
@@ -71,7 +71,7 @@ impl PathTracer {
         let seen = |index: u32, place_px: Vec2| {
             self.luminance_of(self.trace_path(ray_of(place_px, index), key.sample(index)).radiance)
         };
-        let there: Scatter = (0..PATHS).map(|index| seen(index, *place_px)).collect();
+        let there: Luminances = (0..PATHS).map(|index| seen(index, *place_px)).collect();
         there.difference(&(PATHS..2 * PATHS).map(|index| seen(index, *inside_px)).collect())
     }
 }

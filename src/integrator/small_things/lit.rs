@@ -2,12 +2,13 @@
 //!
 //! Nothing says how bright they are but paths to them. Not for pieces of something larger, of which neighbouring pixels tell.
 
-use super::scatter::Scatter;
+use super::luminances::Luminances;
 use super::spots::Spot;
-use super::{Moment, Part, Shine, probe_key};
+use super::{Moment, Part, Shine};
 use crate::geometry::{Facet, Ray, World};
 use crate::integrator::PathTracer;
 use crate::integrator::camera::CameraAt;
+use crate::sampler::{BlockKey, Pixel};
 use crate::scene::{Alpha, Scene, SpherePlace};
 use glam::Vec2;
 use rayon::prelude::*;
@@ -131,10 +132,10 @@ impl PathTracer {
             Shine::Of(object) => object,
         };
         let Some(place_px) = camera.project(spot.position) else { return 0.0 };
-        let key = probe_key(STREAM, number, moment.number);
+        let key = BlockKey::of_probe(STREAM, Pixel { x: number as u32, y: moment.number as u32 });
         let luminance = |ray: Ray, index: u32| self.luminance_of(self.trace_path(ray, key.sample(index)).radiance);
         let own = camera.ray_through(place_px);
-        let own: Scatter = (0..PATHS).map(|index| luminance(own, index)).collect();
+        let own: Luminances = (0..PATHS).map(|index| luminance(own, index)).collect();
         let others = (PATHS..).zip(around(camera, spot)).filter(|(_, ray)| !self.meets(ray, object));
         own.difference(&others.map(|(index, ray)| luminance(ray, index)).collect())
     }

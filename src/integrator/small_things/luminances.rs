@@ -5,15 +5,15 @@ pub(super) const LEAST_CONTRAST: f32 = 0.3;
 /// So is what is fewer standard errors of these paths.
 const LEAST_ERRORS: f32 = 2.0;
 
-/// How luminances scatter.
+/// Luminances that paths found.
 #[derive(Default)]
-pub(super) struct Scatter {
+pub(super) struct Luminances {
     count: f32,
     sum: f32,
     squares: f32,
 }
 
-impl FromIterator<f32> for Scatter {
+impl FromIterator<f32> for Luminances {
     fn from_iter<I: IntoIterator<Item = f32>>(numbers: I) -> Self {
         numbers.into_iter().fold(Self::default(), |Self { count, sum, squares }, number| Self {
             count: count + 1.0,
@@ -23,7 +23,7 @@ impl FromIterator<f32> for Scatter {
     }
 }
 
-impl Scatter {
+impl Luminances {
     /// How far the mean is from that of surroundings; 0 where that is too little, or no more than chance.
     pub(super) fn difference(&self, surroundings: &Self) -> f32 {
         let difference = (self.mean() - surroundings.mean()).abs();
