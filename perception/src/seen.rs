@@ -3,9 +3,16 @@
 //! A pixel's error is pushed through the operator by itself, with what the eye is adapted to at that pixel; how a local
 //! operator would spread it to other pixels is ignored.
 
+mod shown;
+
+use crate::csf::ChromaticChannel;
 use crate::display::Display;
-use crate::plane::Plane;
+use crate::opponent::{OPPONENT_OF_RGB, Opponent, opponent};
+use crate::photometry::REC709_WEIGHTS;
+use crate::plane::{PIXELS_A_TASK, Plane};
 use crate::tone::{FittedTone, Pixel};
+use rayon::prelude::*;
+use shown::{Noise, Shown};
 
 /// What the display shows, cd/m², for scene luminance in cd/m².
 #[must_use]
@@ -63,24 +70,77 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
         if variance < 0.0 {
             return f32::INFINITY;
         }
-        shown.variance(pixel, f64::from(mean.max(0.0)), f64::from(variance))
+        shown.pixel(pixel, Noise { mean: f64::from(mean.max(0.0)), variance: f64::from(variance) }).variance()
     })
 }
 
-/// Variance of a chromatic signal as displayed, (cd/m²)², for one of variance `variance` ((cd/m²)², of the mean) on scene
-/// luminance `mean` (cd/m²), by what the operator leaves of a faint tint on a grey
-/// ([`FittedTone::chromatic_slope_at`]). What a display's clip of single channels hides is not taken off.
+/// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², for those of the scene, `scene` ((cd/m²)², of the
+/// mean), on scene luminance `mean` (cd/m²): of luminance as [`display_variance`]; of colour by what the operator leaves of a faint
+/// tint on a grey, `chromatic_slope` ([`display_chromatic_slope`]), and by the room for tints below the display's white, where every
+/// colour becomes white ([`crate::tone::fit_into_display`]). Nothing is taken off at black, whose tints are small by themselves.
 ///
-/// Pixels that are not finite, or of negative variance, get infinity; so does every pixel when the planes differ in size.
+/// Pixels that are not finite, or of negative variance, get infinity; of colour also where luminance's variance is so. So does every
+/// pixel when the planes differ in size.
 #[must_use]
-pub fn display_chromatic_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
+pub fn display_opponent_variances(
+    fitted: &dyn FittedTone,
+    display: &Display,
+    mean: &Plane,
+    chromatic_slope: &Plane,
+    scene: [&Plane; 3],
+) -> [Plane; 3] {
+    let (width, height) = (mean.width(), mean.height());
+    if !scene.iter().chain([&chromatic_slope]).all(|plane| plane.same_size(mean)) {
+        return std::array::from_fn(|_| Plane::filled(width, height, f32::INFINITY));
+    }
     let shown = Shown { fitted, display };
-    by_pixel(mean, variance, f32::INFINITY, |pixel, mean, variance| {
-        if variance < 0.0 { f32::INFINITY } else { shown.chromatic_slope(pixel, mean).powi(2) * variance }
-    })
+    let rooms_cd_m2 = [ChromaticChannel::RedGreen, ChromaticChannel::YellowViolet]
+        .map(|channel| room_of_tints(channel) * (display.white_cd_m2 - display.black_cd_m2));
+    let found: Vec<[f32; 3]> = (0..width * height)
+        .into_par_iter()
+        .with_min_len(PIXELS_A_TASK)
+        .map(|index| {
+            let at = |plane: &Plane| plane.values()[index];
+            let (mean, [luminance, red_green, yellow_violet]) = (at(mean), scene.map(at));
+            let is_variance = |variance: f32| variance.is_finite() && variance >= 0.0;
+            if !mean.is_finite() || !is_variance(luminance) {
+                return [f32::INFINITY; 3];
+            }
+            let noise = Noise { mean: f64::from(mean.max(0.0)), variance: f64::from(luminance) };
+            let pixel = shown.pixel(Pixel { x: index % width, y: index / width }, noise);
+            let of_colour = |variance: f32, room_cd_m2: f64| {
+                let unbounded = at(chromatic_slope).powi(2) * variance;
+                if is_variance(variance) { pixel.within_room(unbounded, room_cd_m2) } else { f32::INFINITY }
+            };
+            [pixel.variance(), of_colour(red_green, rooms_cd_m2[0]), of_colour(yellow_violet, rooms_cd_m2[1])]
+                .map(|variance| if variance.is_finite() { variance } else { f32::INFINITY })
+        })
+        .collect();
+    std::array::from_fn(|channel| Plane::from_fn(width, height, |x, y| found[y * width + x][channel]))
 }
 
-/// How much a chromatic signal as displayed is of that of the scene: see [`display_chromatic_variance`].
+/// What of a colour, linear Rec. 709 RGB in scene cd/m², the display shows at `pixel`, cd/m²: more than where it shows nothing.
+#[must_use]
+pub fn display_opponent(fitted: &dyn FittedTone, display: &Display, pixel: Pixel, rgb_cd_m2: [f32; 3]) -> Opponent {
+    let span_cd_m2 = (display.white_cd_m2 - display.black_cd_m2) as f32;
+    opponent(fitted.map_rgb_at(pixel, rgb_cd_m2).map(|channel| span_cd_m2 * channel))
+}
+
+/// How far a chromatic signal can go from a grey that is 1 below white, where white is 1: of red and green, or of violet and yellow,
+/// the one that fits better.
+fn room_of_tints(channel: ChromaticChannel) -> f64 {
+    let weights = REC709_WEIGHTS.map(f64::from);
+    // The first has its luminance taken from green: where green is the one that rises, so much more of it fits.
+    let (row, raised) = match channel {
+        ChromaticChannel::RedGreen => (OPPONENT_OF_RGB[1], 0),
+        ChromaticChannel::YellowViolet => (OPPONENT_OF_RGB[2], 2),
+    };
+    let green_for_raised = weights[raised] / weights[1];
+    (row[raised] - green_for_raised * row[1]).abs() / green_for_raised
+}
+
+/// How much a chromatic signal as displayed is of that of the scene where that is faint ([`FittedTone::chromatic_slope_at`]). What
+/// a display's clip of single channels hides is not taken off.
 #[must_use]
 pub fn display_chromatic_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
@@ -124,93 +184,6 @@ fn by_pixel(first: &Plane, second: &Plane, else_value: f32, of: impl Fn(Pixel, f
     result
 }
 
-/// Standard deviations from the mean beyond which normal noise is let go: 4 lose 0.1 % of the variance.
-const FARTHEST: f64 = 4.0;
-
-/// A display behind an operator.
-struct Shown<'a> {
-    fitted: &'a dyn FittedTone,
-    display: &'a Display,
-}
-
-impl Shown<'_> {
-    fn cd_m2(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
-        let relative = self.fitted.relative_luminance_at(pixel, scene_cd_m2.max(0.0));
-        self.display.luminance_cd_m2(f64::from(relative)) as f32
-    }
-
-    fn chromatic_slope(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
-        let span_cd_m2 = (self.display.white_cd_m2 - self.display.black_cd_m2) as f32;
-        span_cd_m2 * self.fitted.chromatic_slope_at(pixel, scene_cd_m2)
-    }
-
-    fn variance(&self, pixel: Pixel, mean: f64, variance: f64) -> f32 {
-        if variance <= 0.0 {
-            return 0.0;
-        }
-        // Distances of the outer points from the mean. At M = √3 σ both pairs agree.
-        let gauss = (3.0 * variance).sqrt();
-        let (below, above) = if mean >= gauss { (gauss, gauss) } else { (mean, (3.0 * variance / mean).min(1e30)) };
-        if below <= 0.0 || !above.is_finite() {
-            // No light on average, yet noise: only a broken input has that. Take the noise as it stands.
-            let swing = f64::from(self.cd_m2(pixel, gauss as f32) - self.cd_m2(pixel, 0.0));
-            return (swing * swing / 3.0) as f32;
-        }
-        let light = |scene: f64| self.fitted.relative_luminance_at(pixel, scene as f32);
-        let lights = [light(mean - below), light(mean), light(mean + above)];
-        if mean >= gauss && self.clip_is_in_reach(pixel, lights, mean, variance.sqrt()) {
-            return self.clipped_variance(pixel, mean, variance.sqrt());
-        }
-        let weight_below = variance / (below * (below + above));
-        let weight_above = variance / (above * (below + above));
-        let [low, center, high] = lights.map(|relative| self.display.luminance_cd_m2(f64::from(relative)));
-        // As the planes have it: in single precision.
-        let [low, center, high] = [low, center, high].map(|cd_m2| f64::from(cd_m2 as f32));
-        let (low, high) = (low - center, high - center);
-        let offset = weight_below * low + weight_above * high;
-        let spread = (weight_below * low * low + weight_above * high * high - offset * offset).max(0.0);
-        if mean >= gauss {
-            return spread as f32;
-        }
-        let swing = f64::from(self.cd_m2(pixel, (mean + variance.sqrt()) as f32)) - center;
-        (0.5 * (spread + swing * swing)) as f32
-    }
-
-    /// Whether normal noise about `mean` reaches over a clip of the display. `lights`: at √3 σ below the mean, there, and above.
-    fn clip_is_in_reach(&self, pixel: Pixel, lights: [f32; 3], mean: f64, deviation: f64) -> bool {
-        // An operator that clips by itself may round.
-        const WHITE: f32 = 1.0 - 1e-6;
-        let [low, center, high] = lights;
-        let at = |scene: f64| self.fitted.relative_luminance_at(pixel, scene.max(0.0) as f32);
-        if low >= WHITE {
-            // As bright as it gets: only the noise's tail may say otherwise. Without asking for most of them.
-            at(mean - FARTHEST * deviation) < WHITE
-        } else if high <= 0.0 {
-            at(mean + FARTHEST * deviation) > 0.0
-        } else {
-            // On goes the operator as it went from the mean: near enough, and two questions less for every pixel.
-            let further = (FARTHEST / 3.0_f64.sqrt()) as f32;
-            center + further * (high - center) >= WHITE || low <= 0.0 && mean > 1.001 * 3.0_f64.sqrt() * deviation
-        }
-    }
-
-    /// Variance as displayed of normal noise about `mean`, by the midpoint rule; no light is below 0.
-    fn clipped_variance(&self, pixel: Pixel, mean: f64, deviation: f64) -> f32 {
-        const STEPS: i32 = 10;
-        let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
-        let center = f64::from(self.cd_m2(pixel, mean as f32));
-        for step in -STEPS..=STEPS {
-            let deviations = FARTHEST * f64::from(step) / f64::from(STEPS);
-            let weight = (-0.5 * deviations * deviations).exp();
-            let shown = f64::from(self.cd_m2(pixel, (mean + deviations * deviation) as f32)) - center;
-            weights += weight;
-            sum += weight * shown;
-            squares += weight * shown * shown;
-        }
-        (squares / weights - (sum / weights).powi(2)).max(0.0) as f32
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -221,6 +194,14 @@ mod tests {
         let guide = Plane::filled(1, 1, 1.0);
         let viewing = Viewing::of(display.clone());
         operator("absolute", None).unwrap().fit(&SceneGuide::of(&guide), &viewing, None)
+    }
+
+    /// Of red and green, where luminance has no noise.
+    fn chromatic_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
+        let slope = display_chromatic_slope(fitted, display, mean);
+        let [_, red_green, _] =
+            display_opponent_variances(fitted, display, mean, &slope, [&one(0.0), variance, &one(0.0)]);
+        red_green
     }
 
     fn one(value: f32) -> Plane {
@@ -314,12 +295,46 @@ mod tests {
         }
     }
 
+    /// Red for green on noisy grey, below, about and above white, by what the operator makes of 20,000 such colours.
+    #[test]
+    fn tints_have_the_room_that_white_leaves() {
+        const COLOURS: usize = 20_000;
+        let display = Display::default();
+        let fitted = absolute(&display);
+        let pixel = Pixel { x: 0, y: 0 };
+        let red_for_green = [1.0, -REC709_WEIGHTS[0] / REC709_WEIGHTS[1], 0.0];
+        let signal = opponent(red_for_green).red_green;
+        // An even spread over three standard deviations to each side has the variance of 3; steps far apart so that both are independent.
+        let spread =
+            |index: usize, step: usize| ((index * step % COLOURS) as f32 / COLOURS as f32 - 0.5) * 12.0_f32.sqrt();
+        for (mean, deviation, tint) in
+            [(100.0, 5.0, 10.0), (150.0, 20.0, 20.0), (190.0, 10.0, 40.0), (200.0, 10.0, 20.0), (240.0, 10.0, 20.0)]
+        {
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for index in 0..COLOURS {
+                let grey = mean + deviation * spread(index, 7_919);
+                let rgb = red_for_green.map(|part| grey + tint * spread(index, 1_237) * part);
+                let shown = f64::from(display_opponent(&*fitted, &display, pixel, rgb).red_green);
+                sum += shown;
+                squares += shown * shown;
+            }
+            let count = COLOURS as f64;
+            let truth = squares / count - (sum / count).powi(2);
+            let slope = display_chromatic_slope(&*fitted, &display, &one(mean));
+            let scene = [deviation * deviation, (tint * signal).powi(2), 0.0].map(one);
+            let [_, told, _] = display_opponent_variances(&*fitted, &display, &one(mean), &slope, scene.each_ref());
+            let ratio = f64::from(told.get(0, 0)).sqrt() / truth.sqrt().max(1e-6);
+            println!("{mean} ± {deviation}, tint {tint}: told {} true {truth} {ratio}", told.get(0, 0));
+            assert!((0.9..1.8).contains(&ratio) || truth < 1e-6 && told.get(0, 0) < 1e-6, "{mean}: {ratio}");
+        }
+    }
+
     #[test]
     fn a_negative_variance_does_not_pass_for_none() {
         let display = Display::default();
         let fitted = absolute(&display);
         let of = |variance: f32| {
-            [display_variance, display_chromatic_variance]
+            [display_variance, chromatic_variance]
                 .map(|shown| shown(&*fitted, &display, &one(50.0), &one(variance)).get(0, 0))
         };
         assert_eq!((of(-1e-3), of(f32::NAN)), ([f32::INFINITY; 2], [f32::INFINITY; 2]));

@@ -20,7 +20,7 @@ pub struct ChannelStatistics {
     /// Pooled over the neighbours of like surface, the pixel itself left out.
     pub pooled: Plane,
     /// Ratio of the halves' squared difference to what independent samples would show, pooled: below 1 where
-    /// stratification pays.
+    /// stratification pays, and where light is not as unevenly spread as a display that clips it was told.
     pub low_discrepancy_factor: Plane,
     /// The same factor with the pixel itself counted in. For reports, not for decisions.
     pub factor_with_own: Plane,
@@ -40,16 +40,44 @@ pub struct SampleStatistics {
     pub channels: [ChannelStatistics; CHANNELS],
 }
 
+/// What the halves differ by in a channel as they are displayed, (cd/m²)².
+pub struct DifferenceOnDisplay {
+    /// Square of half of it.
+    pub squared: Plane,
+    /// What that would be of independent samples which scatter as they are taken to.
+    pub expected: Plane,
+}
+
 impl SampleStatistics {
     /// Pools a film. `scale` turns each pixel's scene variance, by channel, into what counts: displayed variance, since a
     /// lamp's border scatters far above what the display can show, and its dark neighbours must not inherit that.
     pub fn of(film: &Film, scale: &[Plane; CHANNELS]) -> Self {
+        Self::by(film, scale, |_, evidence| evidence)
+    }
+
+    /// The same, with the halves' differences as the display shows them. Of what is mostly beyond white, variance times a scale tells up to 7
+    /// times the noise that is seen (`benches/results/sampling.md`, what moves the mean).
+    pub fn of_displayed(film: &Film, scale: &[Plane; CHANNELS], differences: &[DifferenceOnDisplay; CHANNELS]) -> Self {
+        Self::by(film, scale, |pixel, mut evidence| {
+            for (evidence, difference) in evidence.iter_mut().zip(differences) {
+                evidence.squared_difference = f64::from(difference.squared.values()[pixel]);
+                evidence.expected_difference = f64::from(difference.expected.values()[pixel]);
+            }
+            evidence
+        })
+    }
+
+    fn by(
+        film: &Film,
+        scale: &[Plane; CHANNELS],
+        refined: impl Fn(usize, [PixelEvidence; CHANNELS]) -> [PixelEvidence; CHANNELS] + Sync,
+    ) -> Self {
         let width = film.width() as usize;
         let (a, b) = (film.half(Half::A), film.half(Half::B));
         let evidence: Vec<[PixelEvidence; CHANNELS]> = (0..a.len())
             .into_par_iter()
             .with_min_len(PIXELS_A_TASK)
-            .map(|i| PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i])))
+            .map(|i| refined(i, PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i]))))
             .collect();
         let surfaces = PixelSurfaces { guides: film.guides(), known_things: film.known_things.as_ref() };
         let pooled = pooled_by_neighbours(&evidence, &surfaces, width);

@@ -23,15 +23,12 @@ pub(crate) fn displayed_variance(subject: &Subject, reference: &Reference, truth
         Plane::from_fn(variance.width(), variance.height(), |x, y| variance.get(x, y) * factor.get(x, y) / spp)
     });
     let tone = truth.tone.as_ref();
-    let shown = [
-        seen::display_variance(tone, display, &mean, &of_mean[0]),
-        seen::display_chromatic_variance(tone, display, &mean, &of_mean[1]),
-        seen::display_chromatic_variance(tone, display, &mean, &of_mean[2]),
-    ];
+    let slope = seen::display_chromatic_slope(tone, display, &mean);
+    let [achromatic, red_green, yellow_violet] =
+        seen::display_opponent_variances(tone, display, &mean, &slope, of_mean.each_ref());
     let thresholds = &truth.thresholds.achromatic;
     let gains = thresholds.chromatic_gains()?;
-    let [achromatic, red_green, yellow_violet] = &shown;
-    let equivalent = thresholds.luminance_equivalent_variance(&gains, [achromatic, red_green, yellow_violet]);
+    let equivalent = thresholds.luminance_equivalent_variance(&gains, [&achromatic, &red_green, &yellow_violet]);
     Ok(equivalent.map(|variance| variance * spp))
 }
 

@@ -2,7 +2,7 @@
 
 use super::keep::{keep_pixels, kept_pixels};
 use super::{BenchSettings, MAIN_COVERAGE, Subject};
-use crate::adaptive::judge::{display_scale, judge, variance_shares};
+use crate::adaptive::judge::{display_scale, judge};
 use crate::adaptive::plan::uniform_plan;
 use crate::adaptive::statistics::SampleStatistics;
 use crate::film::{CHANNELS, Film};
@@ -102,7 +102,7 @@ impl Reference {
         let estimate = film.estimate(settings.nits_per_unit);
         let light = SceneLight::of(settings.operator.as_ref(), film.width() as usize, &estimate.rgb_cd_m2);
         let tone = settings.operator.fit(&light.guide(), &settings.viewing, None);
-        let scale = display_scale(film, &variance_shares(film), light.luminance_cd_m2(), tone.as_ref(), &settings, 1.0);
+        let scale = display_scale(film, light.luminance_cd_m2(), tone.as_ref(), &settings);
         Ok(SampleStatistics::of(film, &scale).channels.map(|channel| channel.low_discrepancy_factor))
     }
 

@@ -1,12 +1,14 @@
 //! What the display makes of the noise of samples.
 
 use super::super::settings::LoopSettings;
-use super::super::statistics::by_channel;
-use crate::film::{CHANNELS, Film, share_of_mean};
+use super::super::statistics::{DifferenceOnDisplay, by_channel};
+use crate::film::{CHANNELS, Film, Halves, share_of_mean};
 use crate::sampler::Half;
-use fechner_perception::Plane;
+use fechner_perception::opponent::Opponent;
 use fechner_perception::seen;
-use fechner_perception::tone::FittedTone;
+use fechner_perception::tone::{FittedTone, Pixel};
+use fechner_perception::{PIXELS_A_TASK, Plane};
+use rayon::prelude::*;
 
 /// Variance of a pixel's mean over that of one sample: [`share_of_mean`].
 pub fn variance_share(film: &Film, pixel: usize) -> f64 {
@@ -22,6 +24,8 @@ pub fn variance_shares(film: &Film) -> Plane {
 pub(super) struct NoiseOnDisplay<'a> {
     /// [`variance_shares`].
     pub(super) shares: &'a Plane,
+    /// [`seen::display_chromatic_slope`] of the guide.
+    pub(super) chromatic_slope: &'a Plane,
     pub(super) tone: &'a dyn FittedTone,
     pub(super) settings: &'a LoopSettings,
     /// Multiplies every variance.
@@ -29,41 +33,103 @@ pub(super) struct NoiseOnDisplay<'a> {
 }
 
 impl NoiseOnDisplay<'_> {
-    /// Displayed over scene variance in a channel about a luminance, cd/m². `variance`: of one sample of a pixel, in scene units.
-    pub(super) fn scale(&self, channel: usize, light: &Plane, variance: impl Fn(usize) -> f64 + Sync) -> Plane {
-        let nits_squared = self.settings.nits_per_unit * self.settings.nits_per_unit * self.inflation;
-        let display = &self.settings.viewing.display;
-        let scene = Plane::from_fn(light.width(), light.height(), |x, y| {
-            let of_mean = variance(y * light.width() + x) * f64::from(self.shares.get(x, y));
-            (of_mean * nits_squared) as f32
-        });
-        let displayed = if channel == 0 {
-            seen::display_variance(self.tone, display, light, &scene)
-        } else {
-            seen::display_chromatic_variance(self.tone, display, light, &scene)
-        };
-        scene.combined(&displayed, |scene, displayed| {
-            let (scene, displayed) = (f64::from(scene), f64::from(displayed));
-            match displayed / scene * nits_squared {
-                _ if scene == 0.0 => 0.0,
-                scale if scale.is_finite() => scale as f32,
-                // Nobody can say how it looks, least of all that it cannot be seen.
-                _ => f32::INFINITY,
-            }
+    /// Displayed over scene variance by channel about a luminance, cd/m². `variance`: of one sample of a pixel in a channel, in scene
+    /// units.
+    pub(super) fn scales(&self, light: &Plane, variance: impl Fn(usize, usize) -> f64 + Sync) -> [Plane; CHANNELS] {
+        let nits_squared = self.nits_squared();
+        self.displayed(light, variance).map(|Displayed { scene, shown }| {
+            scene.combined(&shown, |scene, shown| {
+                let (scene, shown) = (f64::from(scene), f64::from(shown));
+                match shown / scene * nits_squared {
+                    _ if scene == 0.0 => 0.0,
+                    scale if scale.is_finite() => scale as f32,
+                    // Nobody can say how it looks, least of all that it cannot be seen.
+                    _ => f32::INFINITY,
+                }
+            })
         })
+    }
+
+    fn nits_squared(&self) -> f64 {
+        self.settings.nits_per_unit * self.settings.nits_per_unit * self.inflation
+    }
+
+    /// Variance of the mean by channel about a luminance. Arguments as of [`Self::scales`].
+    fn displayed(&self, light: &Plane, variance: impl Fn(usize, usize) -> f64 + Sync) -> [Displayed; CHANNELS] {
+        let nits_squared = self.nits_squared();
+        let display = &self.settings.viewing.display;
+        let scene = by_channel(|c| {
+            Plane::from_fn(light.width(), light.height(), |x, y| {
+                let of_mean = variance(y * light.width() + x, c) * f64::from(self.shares.get(x, y));
+                (of_mean * nits_squared) as f32
+            })
+        });
+        let shown = seen::display_opponent_variances(self.tone, display, light, self.chromatic_slope, scene.each_ref());
+        let mut shown = shown.into_iter();
+        scene.map(|scene| Displayed { scene, shown: shown.next().expect("a channel's") })
     }
 }
 
+/// A channel's variance, (cd/m²)².
+struct Displayed {
+    scene: Plane,
+    /// On the display.
+    shown: Plane,
+}
+
 /// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display
-/// makes of a pixel's own noise, before any pooling. From scene units; inflation included. `shares`: [`variance_shares`].
-pub fn display_scale(
+/// makes of a pixel's own noise, before any pooling. From scene units.
+pub fn display_scale(film: &Film, guide: &Plane, tone: &dyn FittedTone, settings: &LoopSettings) -> [Plane; CHANNELS] {
+    let chromatic_slope = seen::display_chromatic_slope(tone, &settings.viewing.display, guide);
+    let shares = variance_shares(film);
+    NoiseOnDisplay { shares: &shares, chromatic_slope: &chromatic_slope, tone, settings, inflation: 1.0 }
+        .scales(guide, |pixel, c| film.halves(pixel).sample_variance(c))
+}
+
+/// What the halves differ by as displayed, by channel, and what independent samples about the guide's luminance would. `guide`: cd/m².
+/// `chromatic_slope`: [`seen::display_chromatic_slope`] of it.
+///
+/// Means of a half scatter by more than the picture's, whose noise this is to correct: above a clip they reach below it more often, so
+/// that what is taken off is rather too little.
+pub(super) fn difference_on_display(
     film: &Film,
-    shares: &Plane,
     guide: &Plane,
+    chromatic_slope: &Plane,
     tone: &dyn FittedTone,
     settings: &LoopSettings,
-    inflation: f64,
-) -> [Plane; CHANNELS] {
-    let noise = NoiseOnDisplay { shares, tone, settings, inflation };
-    by_channel(|c| noise.scale(c, guide, |pixel| film.halves(pixel).sample_variance(c)))
+) -> [DifferenceOnDisplay; CHANNELS] {
+    let of_halves = film.plane(|pixel| match film.halves(pixel) {
+        Halves::Both(both) => both.map(|half| 0.5 / half.samples as f32).iter().sum(),
+        Halves::Only(_) => 0.0,
+    });
+    let noise = NoiseOnDisplay { shares: &of_halves, chromatic_slope, tone, settings, inflation: 1.0 };
+    let (squared, expected) = rayon::join(
+        || squared_differences(film, guide.width(), tone, settings),
+        || noise.displayed(guide, |pixel, c| film.halves(pixel).sample_variance(c)),
+    );
+    let mut both = squared.into_iter().zip(expected);
+    std::array::from_fn(|_| {
+        let (squared, Displayed { shown: expected, .. }) = both.next().expect("a channel's");
+        DifferenceOnDisplay { squared, expected: expected.map(|variance| 0.5 * variance) }
+    })
+}
+
+/// Square of half of what the halves differ by as displayed, by channel, (cd/m²)²; 0 where one of them has no samples.
+fn squared_differences(film: &Film, width: usize, tone: &dyn FittedTone, settings: &LoopSettings) -> [Plane; CHANNELS] {
+    let differences: Vec<[f32; CHANNELS]> = (0..film.pixel_count())
+        .into_par_iter()
+        .with_min_len(PIXELS_A_TASK)
+        .map(|index| {
+            let Halves::Both(both) = film.halves(index) else { return [0.0; CHANNELS] };
+            let pixel = Pixel { x: index % width, y: index / width };
+            let [a, b] = both.map(|half| {
+                let rgb_cd_m2 = half.mean.map(|channel| (settings.nits_per_unit * channel) as f32);
+                seen::display_opponent(tone, &settings.viewing.display, pixel, rgb_cd_m2)
+            });
+            let half = |of: fn(&Opponent) -> f32| 0.5 * (of(&a) - of(&b));
+            [half(|shown| shown.achromatic), half(|shown| shown.red_green), half(|shown| shown.yellow_violet)]
+                .map(|difference| difference * difference)
+        })
+        .collect();
+    by_channel(|c| film.plane(|index| differences[index][c]))
 }

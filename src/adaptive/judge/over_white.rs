@@ -52,7 +52,7 @@ impl OverWhite {
         let of_mean = scatter.of_mean(&pooled_per_sample);
         let visibility = thresholds.visibility(&of_mean);
         let per_sample_of_halves = (purpose == Purpose::Plan)
-            .then(|| scatter.per_sample_of_halves(&over, [scatter.luminance_scale(); 2], &thresholds.in_bands, None));
+            .then(|| scatter.per_sample_of_halves(&over, [scatter.scales(); 2], &thresholds.in_bands, None));
         let ground_half_difference = ground_half_difference(film, ground_cd_m2);
         Ok(Self { thresholds, visibility, pooled_per_sample, per_sample_of_halves, ground_half_difference })
     }

@@ -54,7 +54,7 @@ impl PerSample {
         let gains = chromatic_gains(thresholds, settings)?;
         still_wanted(settings)?;
         let of_halves = lights.map(|lights| {
-            let scales = scatter.luminance_scales_of_halves(film, lights, tone, settings, inflation);
+            let scales = scatter.scales_of_halves(film, lights, tone, settings, inflation);
             scatter.per_sample_of_halves(film, scales.each_ref(), thresholds, gains.as_ref())
         });
         let met = scatter.pooled_per_sample(thresholds, gains.as_ref());

@@ -5,7 +5,7 @@ use super::super::missed::{Darkness, EdgeProfile, FoundLight, LampEdges};
 use super::super::settings::LoopSettings;
 use super::super::small_things::unmet_noise;
 use super::super::statistics::{SampleStatistics, by_channel, scene_units};
-use super::noise_on_display::{NoiseOnDisplay, display_scale, variance_shares};
+use super::noise_on_display::{NoiseOnDisplay, difference_on_display, variance_shares};
 use super::{JudgeError, guide_rgb, still_wanted};
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
@@ -62,12 +62,15 @@ impl<'a> Guide<'a> {
 pub(super) struct Scatter {
     /// [`variance_shares`].
     shares: Plane,
-    /// [`display_scale`].
-    scale: [Plane; CHANNELS],
+    /// [`seen::display_chromatic_slope`] of the guide.
+    chromatic_slope: Plane,
+    /// Displayed over scene variance by channel, at the size that variances have now: [`super::display_scale`], with inflation.
+    scales: [Plane; CHANNELS],
     statistics: SampleStatistics,
 }
 
 impl Scatter {
+    /// `guide`: its luminance, cd/m².
     pub(super) fn of(
         film: &Film,
         guide: &Plane,
@@ -76,23 +79,32 @@ impl Scatter {
         inflation: f64,
     ) -> Self {
         let shares = variance_shares(film);
-        let scale = display_scale(film, &shares, guide, tone, settings, inflation);
-        Self::scaled(film, shares, scale)
+        let chromatic_slope = seen::display_chromatic_slope(tone, &settings.viewing.display, guide);
+        let noise = NoiseOnDisplay { shares: &shares, chromatic_slope: &chromatic_slope, tone, settings, inflation };
+        let (scales, differences) = rayon::join(
+            || noise.scales(guide, |pixel, c| film.halves(pixel).sample_variance(c)),
+            || difference_on_display(film, guide, &chromatic_slope, tone, settings),
+        );
+        let statistics = SampleStatistics::of_displayed(film, &scales, &differences);
+        Self { shares, chromatic_slope, scales, statistics }
     }
 
     /// Of a film that holds what is displayed.
     pub(super) fn of_displayed(film: &Film) -> Self {
-        Self::scaled(film, variance_shares(film), scene_units(film))
+        let scales = scene_units(film);
+        let statistics = SampleStatistics::of(film, &scales);
+        let chromatic_slope = Plane::filled(film.width() as usize, film.height() as usize, 1.0);
+        Self { shares: variance_shares(film), chromatic_slope, scales, statistics }
     }
 
-    fn scaled(film: &Film, shares: Plane, scale: [Plane; CHANNELS]) -> Self {
-        let statistics = SampleStatistics::of(film, &scale);
-        Self { shares, scale, statistics }
+    /// Displayed over scene variance by channel.
+    pub(super) fn scales(&self) -> &[Plane; CHANNELS] {
+        &self.scales
     }
 
-    /// Displayed over scene variance of luminance.
+    /// The same of luminance.
     pub(super) fn luminance_scale(&self) -> &Plane {
-        &self.scale[0]
+        &self.scales[0]
     }
 
     /// Variance of each pixel's mean of which this is one sample's.
@@ -100,23 +112,24 @@ impl Scatter {
         per_sample.combined(&self.shares, |sample, share| sample * share)
     }
 
-    /// Displayed over scene variance of luminance for what each half decides by: of the other half's light and noise. Where both halves' went
+    /// Displayed over scene variance by channel for what each half decides by: of the other half's light and noise. Where both halves' went
     /// in, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
     /// tube of light made a picture 2.75 % too bright (`benches/results/sampling.md`, lamps on black, dust and wires). Of both are still which pixels shine, how
-    /// many samples there are, the scales of colour, which the display does not clip, and what is seen over white. `lights`: of the halves.
-    pub(super) fn luminance_scales_of_halves(
+    /// many samples there are, and what is seen over white. `lights`: of the halves.
+    pub(super) fn scales_of_halves(
         &self,
         film: &Film,
         lights: &[FoundLight; 2],
         tone: &dyn FittedTone,
         settings: &LoopSettings,
         inflation: f64,
-    ) -> [Plane; 2] {
-        let noise = NoiseOnDisplay { shares: &self.shares, tone, settings, inflation };
+    ) -> [[Plane; CHANNELS]; 2] {
+        let (shares, chromatic_slope) = (&self.shares, &self.chromatic_slope);
+        let noise = NoiseOnDisplay { shares, chromatic_slope, tone, settings, inflation };
         Half::BOTH.map(|half| {
             let other = half.other();
-            let variance = |pixel: usize| film.half(other)[pixel].sample_variance(0);
-            noise.scale(0, &lights[other.index()].mean_cd_m2, variance)
+            let variance = |pixel: usize, c: usize| film.half(other)[pixel].sample_variance(c);
+            noise.scales(&lights[other.index()].mean_cd_m2, variance)
         })
     }
 
@@ -153,19 +166,17 @@ impl Scatter {
         most_visible(thresholds, gains, |c| self.statistics.channels[c].stratified_variance())
     }
 
-    /// [`super::Judgement::variance_per_sample`]. `luminance_scales`: [`Self::luminance_scales_of_halves`].
+    /// [`super::Judgement::variance_per_sample`]. `scales`: [`Self::scales_of_halves`].
     pub(super) fn per_sample_of_halves(
         &self,
         film: &Film,
-        luminance_scales: [&Plane; 2],
+        scales: [&[Plane; CHANNELS]; 2],
         thresholds: &ThresholdMap,
         gains: Option<&ChromaticGains>,
     ) -> [Plane; 2] {
         Half::BOTH.map(|half| {
-            let of_channel = |c: usize| {
-                let scale = if c == 0 { luminance_scales[half.index()] } else { &self.scale[c] };
-                self.statistics.stratified_variance_for_half(film, scale, half, c)
-            };
+            let of_channel =
+                |c: usize| self.statistics.stratified_variance_for_half(film, &scales[half.index()][c], half, c);
             most_visible(thresholds, gains, of_channel)
         })
     }

@@ -34,6 +34,20 @@ fn isoluminant_noise_is_seen_in_denoised_pictures() {
     assert!(seen.get(32, 32) > 10.0 * blind.get(32, 32), "{} and {}", seen.get(32, 32), blind.get(32, 32));
 }
 
+/// Beyond white every colour is white, and one sample in sixteen that brings thirty times as much changes nothing of what is shown. Without the
+/// halves' difference as displayed, visibility of the second was told as 19.
+#[test]
+fn noise_beyond_white_is_not_seen() {
+    let red_for_green = Vec3::new(1.0, -0.2126 / 0.7152, 0.0);
+    let coloured = film_of(|_, random| Vec3::splat(3.0) + 2.0 * random * red_for_green);
+    let rare = film_of(|_, random| Vec3::splat(if random > 0.875 { 80.0 } else { 2.4 }));
+    for (film, most) in [(coloured, 0.01), (rare, 3.0)] {
+        let judgement = judge(&film, &settings(), 1.0).expect("judges");
+        let told = judgement.predicted.quantile(0.99);
+        assert!(told < most, "{told}");
+    }
+}
+
 /// A film of so many samples of grey noise in half A of each pixel, and so many in half B.
 fn noisy(samples: [u32; 2]) -> Film {
     film_of_halves(samples, |_| false, |_, _, random| Vec3::splat(0.8 + 0.5 * random))

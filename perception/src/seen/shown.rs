@@ -1,0 +1,206 @@
+//! One pixel's noise through operator and display: the operator asked at three points, or at 21 where it clips.
+
+use crate::display::Display;
+use crate::tone::{FittedTone, Pixel};
+
+/// Standard deviations from the mean beyond which normal noise is let go: 4 lose 0.1 % of the variance.
+const FARTHEST: f64 = 4.0;
+
+/// A display behind an operator.
+pub(super) struct Shown<'a> {
+    pub(super) fitted: &'a dyn FittedTone,
+    pub(super) display: &'a Display,
+}
+
+impl Shown<'_> {
+    pub(super) fn cd_m2(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        self.emitted_cd_m2(self.fitted.relative_luminance_at(pixel, scene_cd_m2.max(0.0)))
+    }
+
+    /// In single precision, as the planes have it.
+    fn emitted_cd_m2(&self, relative: f32) -> f32 {
+        self.display.luminance_cd_m2(f64::from(relative)) as f32
+    }
+
+    pub(super) fn chromatic_slope(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let span_cd_m2 = (self.display.white_cd_m2 - self.display.black_cd_m2) as f32;
+        span_cd_m2 * self.fitted.chromatic_slope_at(pixel, scene_cd_m2)
+    }
+
+    /// A pixel with noisy light.
+    pub(super) fn pixel(&self, pixel: Pixel, noise: Noise) -> NoisyPixel<'_> {
+        NoisyPixel { shown: self, pixel, noise, points: Points::of(noise, |scene| self.relative(pixel, scene)) }
+    }
+
+    fn relative(&self, pixel: Pixel, scene_cd_m2: f64) -> f32 {
+        self.fitted.relative_luminance_at(pixel, scene_cd_m2.max(0.0) as f32)
+    }
+}
+
+/// A pixel's scene luminance.
+#[derive(Clone, Copy)]
+pub(super) struct Noise {
+    /// cd/m², at least 0.
+    pub(super) mean: f64,
+    /// Of the mean, (cd/m²)², at least 0.
+    pub(super) variance: f64,
+}
+
+impl Noise {
+    /// Distance of the outer points of Gauss and Hermite from the mean, cd/m².
+    fn gauss(self) -> f64 {
+        (3.0 * self.variance).sqrt()
+    }
+
+    /// Whether these points are light.
+    fn is_normal(self) -> bool {
+        self.mean >= self.gauss()
+    }
+
+    fn deviation(self) -> f64 {
+        self.variance.sqrt()
+    }
+}
+
+/// Three points that have the mean and the variance of noisy light, and what the operator makes of them.
+struct Points {
+    /// Distances of the outer points from the mean, cd/m². At M = √3 σ both kinds of points agree.
+    below: f64,
+    above: f64,
+    /// Below, at and above the mean.
+    relative: [f32; 3],
+}
+
+impl Points {
+    /// `None` without noise; or without light on average and yet noise, which only a broken input has.
+    fn of(noise: Noise, relative: impl Fn(f64) -> f32) -> Option<Self> {
+        let Noise { mean, variance } = noise;
+        let gauss = noise.gauss();
+        let (below, above) = if noise.is_normal() { (gauss, gauss) } else { (mean, (3.0 * variance / mean).min(1e30)) };
+        let has_points = below > 0.0 && above.is_finite();
+        has_points.then(|| Self { below, above, relative: [mean - below, mean, mean + above].map(relative) })
+    }
+
+    /// What the points weigh.
+    fn weights(&self, noise: Noise) -> [f64; 3] {
+        let Self { below, above, .. } = *self;
+        let outer = [below, above].map(|distance| noise.variance / (distance * (below + above)));
+        [outer[0], 1.0 - outer[0] - outer[1], outer[1]]
+    }
+}
+
+/// A pixel with noisy light behind operator and display.
+pub(super) struct NoisyPixel<'a> {
+    shown: &'a Shown<'a>,
+    pixel: Pixel,
+    noise: Noise,
+    points: Option<Points>,
+}
+
+impl NoisyPixel<'_> {
+    /// Variance of the displayed luminance, (cd/m²)²: see [`super::display_variance`].
+    pub(super) fn variance(&self) -> f32 {
+        let Noise { mean, variance } = self.noise;
+        if variance <= 0.0 {
+            return 0.0;
+        }
+        let Some(points) = &self.points else {
+            // Take the noise as it stands.
+            let swing = self.cd_m2(self.noise.gauss()) - self.cd_m2(0.0);
+            return (swing * swing / 3.0) as f32;
+        };
+        if self.noise.is_normal() && self.clip_is_in_reach(points.relative) {
+            return self.clipped_variance();
+        }
+        let [weight_below, _, weight_above] = points.weights(self.noise);
+        let [low, center, high] = points.relative.map(|relative| f64::from(self.shown.emitted_cd_m2(relative)));
+        let (low, high) = (low - center, high - center);
+        let offset = weight_below * low + weight_above * high;
+        let spread = (weight_below * low * low + weight_above * high * high - offset * offset).max(0.0);
+        if self.noise.is_normal() {
+            return spread as f32;
+        }
+        let swing = self.cd_m2(mean + variance.sqrt()) - center;
+        (0.5 * (spread + swing * swing)) as f32
+    }
+
+    /// How much of a chromatic variance, `unbounded` (cd/m²)², fits the display: at most the square of the room that each luminance
+    /// leaves for a tint. `room_cd_m2`: of black.
+    pub(super) fn within_room(&self, unbounded: f32, room_cd_m2: f64) -> f32 {
+        let unbounded = f64::from(unbounded);
+        let fits = |relative: f32| {
+            let room = f64::from((1.0 - relative).max(0.0)) * room_cd_m2;
+            unbounded.min(room * room)
+        };
+        let Some(points) = &self.points else {
+            return if self.noise.variance <= 0.0 {
+                fits(self.relative(self.noise.mean)) as f32
+            } else {
+                unbounded as f32
+            };
+        };
+        let fitting = points.relative.map(fits);
+        if fitting[2] >= unbounded {
+            return unbounded as f32;
+        }
+        if !self.noise.is_normal() {
+            let weights = points.weights(self.noise);
+            return weights.iter().zip(fitting).map(|(weight, fits)| weight.max(0.0) * fits).sum::<f64>() as f32;
+        }
+        let (mut weights, mut sum) = (0.0, 0.0);
+        for (scene, weight) in self.normal_points() {
+            weights += weight;
+            sum += weight * fits(self.relative(scene));
+        }
+        (sum / weights) as f32
+    }
+
+    /// Whether normal noise reaches over a clip of the display. `relative`: below, at and above the mean.
+    fn clip_is_in_reach(&self, [low, center, high]: [f32; 3]) -> bool {
+        // An operator that clips by itself may round.
+        const WHITE: f32 = 1.0 - 1e-6;
+        let Noise { mean, .. } = self.noise;
+        let deviation = self.noise.deviation();
+        if low >= WHITE {
+            // As bright as it gets: only the noise's tail may say otherwise. Without asking for most of them.
+            self.relative(mean - FARTHEST * deviation) < WHITE
+        } else if high <= 0.0 {
+            self.relative(mean + FARTHEST * deviation) > 0.0
+        } else {
+            // On goes the operator as it went from the mean: near enough, and two questions less for every pixel.
+            let further = (FARTHEST / 3.0_f64.sqrt()) as f32;
+            center + further * (high - center) >= WHITE || low <= 0.0 && mean > 1.001 * self.noise.gauss()
+        }
+    }
+
+    /// Variance as displayed of normal noise.
+    fn clipped_variance(&self) -> f32 {
+        let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        let center = self.cd_m2(self.noise.mean);
+        for (scene, weight) in self.normal_points() {
+            let shown = self.cd_m2(scene) - center;
+            weights += weight;
+            sum += weight * shown;
+            squares += weight * shown * shown;
+        }
+        (squares / weights - (sum / weights).powi(2)).max(0.0) as f32
+    }
+
+    /// Luminances of normal noise, cd/m², and what they weigh: the midpoint rule. No light is below 0, which who asks has to see to.
+    fn normal_points(&self) -> impl Iterator<Item = (f64, f64)> {
+        const STEPS: i32 = 10;
+        let (mean, deviation) = (self.noise.mean, self.noise.deviation());
+        (-STEPS..=STEPS).map(move |step| {
+            let deviations = FARTHEST * f64::from(step) / f64::from(STEPS);
+            (mean + deviations * deviation, (-0.5 * deviations * deviations).exp())
+        })
+    }
+
+    fn relative(&self, scene_cd_m2: f64) -> f32 {
+        self.shown.relative(self.pixel, scene_cd_m2)
+    }
+
+    fn cd_m2(&self, scene_cd_m2: f64) -> f64 {
+        f64::from(self.shown.cd_m2(self.pixel, scene_cd_m2 as f32))
+    }
+}
