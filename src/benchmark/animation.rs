@@ -11,12 +11,10 @@ use super::name::distinct_names;
 use super::reached::Reached;
 use super::reference::trace_up_to;
 use super::{tone_operator, viewing};
-use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings, Sampling};
+use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings};
 use crate::adaptive::{Quiet, render};
 use crate::animate::budget::Needs;
-use crate::animate::eye::Eye;
 use crate::animate::track::Track;
-use crate::animate::velocity::VelocityOf;
 use crate::animate::{SceneSource, ShotSettings};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use crate::film::Film;
@@ -170,21 +168,12 @@ impl<'a> Bench<'a> {
             limits.pilot_samples = DENOISED_PILOT_SAMPLES_A_PIXEL;
         }
         let first = (START_S * rate).round() as u32;
+        let trace = TraceSettings::new(settings.size.0, settings.size.1, 0);
         let shot = ShotSettings {
             first,
             last: first + settings.frames - 1,
-            frames_per_second: rate,
-            pausable: false,
-            trace: TraceSettings::new(settings.size.0, settings.size.1, 0),
-            sampling: Sampling::Adaptive,
-            limits,
-            viewing,
-            nits_per_unit: first_scene.nits_per_unit,
-            adapted_to_cd_m2: None,
-            gaze: None,
             denoiser,
-            eye: Eye::Rests,
-            velocity_of: VelocityOf::Surface,
+            ..ShotSettings::new(rate, trace, limits, viewing, first_scene.nits_per_unit)
         };
         let operator = tone_operator(&first_scene)?;
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;
