@@ -12,7 +12,7 @@ use fechner::adaptive::settings::{Limits, THRESHOLD};
 use fechner::adaptive::{Rendered, StopReason, is_reached};
 use fechner::checkpoint::{merge_files, write_checkpoint};
 use fechner::output::rendered::Background;
-use fechner::output::{self, Format};
+use fechner::output::{self, PictureFormat};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `merge`.
@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
             "note: sampled under an importance map (content {map}), which films do not keep: what can be seen is told without it"
         );
     }
-    if format == Some(Format::Exr) && merged.header.settings.frames.is_some() {
+    if format == Some(PictureFormat::Exr) && merged.header.settings.frames.is_some() {
         say!("note: films keep no motion: the picture of this frame is without the velocities that it has in its shot");
     }
     let tracing = *merged.header.origin.tracing.settings();

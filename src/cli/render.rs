@@ -21,7 +21,7 @@ use fechner::adaptive::{self, Rendered, StopReason};
 use fechner::checkpoint::{Header, Origin, SettingsRecord};
 use fechner::integrator::{Crop, PathTracer, TraceSettings};
 use fechner::output::rendered::Background;
-use fechner::output::{self, PartOf};
+use fechner::output::{self, PartOf, PictureFormat};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -73,7 +73,7 @@ fn written(arguments: &RenderArguments) -> Vec<Named<'_>> {
     files.into_iter().chain(arguments.maps.iter().map(|map| ("--map", Some(map.file())))).collect()
 }
 
-fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<ExitCode> {
+fn render_and_write(arguments: &RenderArguments, format: PictureFormat) -> anyhow::Result<ExitCode> {
     let mut prepared = arguments.job.prepare_samples()?;
     check_scene_kept(&written(arguments))?;
     // Of renders that were killed as they wrote.
@@ -160,7 +160,7 @@ impl FilesWritten {
     /// Each is tried, whatever became of the others.
     fn try_all(
         arguments: &RenderArguments,
-        format: output::Format,
+        format: PictureFormat,
         rendered: &Rendered,
         settings: &LoopSettings,
         report: &Report,
@@ -210,7 +210,7 @@ fn kept_elsewhere(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>, erro
 /// Writes the picture in the format that its name asks for; a PNG has no place in a whole.
 pub(super) fn write_picture(
     path: &Path,
-    format: output::Format,
+    format: PictureFormat,
     background: Background,
     rendered: &Rendered,
     settings: &LoopSettings,
@@ -218,10 +218,10 @@ pub(super) fn write_picture(
     part_of: Option<PartOf>,
 ) -> anyhow::Result<()> {
     match format {
-        output::Format::Png => {
+        PictureFormat::Png => {
             output::rendered::write_display_png(path, rendered, &settings.viewing.display, background)?;
         }
-        output::Format::Exr => {
+        PictureFormat::Exr => {
             let attributes = report.attributes();
             output::rendered::write_layers_exr(path, rendered, settings, background, &attributes, part_of)?;
         }

@@ -1,8 +1,8 @@
 //! Where a farm's files are, and how units are numbered.
 
-use super::manifest::{FrameEntry, Manifest, ManifestError, PictureFormat, Work};
+use super::manifest::{FrameEntry, Manifest, ManifestError, Work};
 use crate::animate::name::FrameName;
-use crate::output::{OutputError, write_beside};
+use crate::output::{OutputError, PictureFormat, write_beside};
 use crate::read_file;
 use crate::scene::hash::ContentHash;
 use std::io::Write as _;

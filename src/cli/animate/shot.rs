@@ -24,7 +24,7 @@ use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSetting
 use fechner::checkpoint::SettingsRecord;
 use fechner::denoise::Denoiser;
 use fechner::output::rendered::{Background, layers, write_display_png};
-use fechner::output::{self, Attribute, Format};
+use fechner::output::{self, Attribute, PictureFormat};
 use fechner::scene::Scene;
 use fechner_perception::tone::{ToneOperator, ToneSettings, operator_named};
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ pub(in crate::cli) struct Shot<'a> {
     operator_name: String,
     exposure_stops: Option<f64>,
     name: FrameName,
-    format: Format,
+    format: PictureFormat,
 }
 
 impl<'a> Shot<'a> {
@@ -63,12 +63,12 @@ impl<'a> Shot<'a> {
             bail!("--frames reaches beyond --shot");
         }
         let first_file = name.of(arguments.frames.first);
-        let format = Format::of(&first_file)?;
+        let format = PictureFormat::of(&first_file)?;
         let is_followed = matches!(arguments.eye, EyeChoice::Track | EyeChoice::Saliency);
-        if format == Format::Png && arguments.velocity_of == VelocityChoice::Image && !is_followed {
+        if format == PictureFormat::Png && arguments.velocity_of == VelocityChoice::Image && !is_followed {
             bail!("--velocity-of image: PNG frames hold no motion; name the frames .exr");
         }
-        if format == Format::Png && arguments.aov_names == AovNames::Blender {
+        if format == PictureFormat::Png && arguments.aov_names == AovNames::Blender {
             bail!("--aov-names blender: PNG frames hold no motion; name the frames .exr");
         }
         let source = FileSource::new(arguments);
@@ -277,8 +277,10 @@ impl<'a> Shot<'a> {
 
     fn write(&self, file: &Path, made: &RenderedFrame, settings: &LoopSettings, report: &Report) -> Result<()> {
         match self.format {
-            Format::Png => write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?,
-            Format::Exr => {
+            PictureFormat::Png => {
+                write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?
+            }
+            PictureFormat::Exr => {
                 let attributes = report.attributes();
                 let mut picture = layers(&made.rendered, settings, Background::Shown, &attributes);
                 push_velocity(&mut picture, &made.velocity, self.arguments.aov_names);

@@ -3,12 +3,13 @@
 use super::Session;
 use super::problems::Cause;
 use crate::adaptive::{LastLook, Rendered, StopReason};
-use crate::preview::command::{Phase, SavedFormat};
+use crate::output::PictureFormat;
+use crate::preview::command::Phase;
 use std::path::PathBuf;
 
 impl Session<'_> {
     /// Writes the picture so far under a name that is free.
-    pub(super) fn save(&mut self, format: SavedFormat) {
+    pub(super) fn save(&mut self, format: PictureFormat) {
         if self.state.film.total_samples() == 0 {
             self.problems.meet(Cause::Save, "not saved: the picture has no samples yet".to_owned());
             return;
@@ -46,12 +47,9 @@ impl Session<'_> {
     }
 
     /// The scene file's name and the first free number, in the working folder.
-    fn free_name(&self, format: SavedFormat) -> PathBuf {
+    fn free_name(&self, format: PictureFormat) -> PathBuf {
         let stem = self.host.scene_file().file_stem().map_or_else(|| "view".into(), |stem| stem.to_string_lossy());
-        let ending = match format {
-            SavedFormat::Png => "png",
-            SavedFormat::Exr => "exr",
-        };
+        let ending = format.ending();
         let name = |number: u32| PathBuf::from(format!("{stem}-{number}.{ending}"));
         // A link that leads nowhere is somebody's name, too.
         (1..).map(name).find(|path| path.symlink_metadata().is_err()).unwrap_or_else(|| name(0))
