@@ -5,7 +5,6 @@
 //! stills.
 
 use super::flicker::{FlickerJudge, Steadiness};
-use super::keep::keep;
 use super::metrics::video_jod;
 use super::name::distinct_names;
 use super::reached::Reached;
@@ -19,6 +18,7 @@ use crate::animate::{SceneSource, ShotSettings};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use crate::film::Film;
 use crate::integrator::{PathTracer, TraceSettings};
+use crate::json_file;
 use crate::sampler::hash_words;
 use crate::scene::Scene;
 use crate::scene::load::{LoadError, LoadOptions, load};
@@ -103,7 +103,7 @@ impl AnimationResults {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(results: &[Self], file: &Path) -> Result<()> {
-        keep(file, results)
+        Ok(json_file::write(file, results)?)
     }
 }
 

@@ -4,7 +4,7 @@
 //! tile with what can truly be seen of their error, and (2) spends growing budgets by three rules and reads off where the
 //! denoised pictures reach a quality by metrics that none of them optimises (`race.rs`). Not for animation.
 
-use super::keep::{keep, kept_or_made};
+use super::keep::kept_or_made;
 use super::metrics::Metrics;
 use super::name::distinct_names;
 use super::race::{Race, RaceMean, RacePoint, RaceRule, compare_with_uniform, means};
@@ -15,6 +15,7 @@ use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, LoopSettings, Ri
 use crate::adaptive::{Quiet, render};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use crate::integrator::PILOT_SAMPLES_A_PIXEL;
+use crate::json_file;
 use anyhow::Result;
 use fechner_perception::Plane;
 use fechner_perception::denoised::VISIBLY_WRONG;
@@ -135,7 +136,7 @@ pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<Den
     if settings.with_races {
         results.race_means = means(&results.races);
     }
-    keep(&settings.bench.output.join("denoise.json"), &results)?;
+    json_file::write(&settings.bench.output.join("denoise.json"), &results)?;
     Ok(results)
 }
 

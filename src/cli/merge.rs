@@ -1,7 +1,6 @@
 //! `fechner merge`: films of different seeds in, one film or its picture out.
 
 use super::claim::Claim;
-use super::json::write_json;
 use super::numbers::parse_positive;
 use super::render::write_picture;
 use super::report::{Interrupter, Report, summary};
@@ -11,6 +10,7 @@ use fechner::adaptive::judge::judge;
 use fechner::adaptive::settings::{Limits, THRESHOLD};
 use fechner::adaptive::{Rendered, StopReason, is_reached};
 use fechner::checkpoint::{merge_files, write_checkpoint};
+use fechner::json_file;
 use fechner::output::rendered::Background;
 use fechner::output::{self, PictureFormat};
 use std::path::{Path, PathBuf};
@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
         write_picture(&arguments.output, format, background, &rendered, &settings, &report, part_of)?;
     }
     if let Some(path) = &arguments.json {
-        write_json(path, &report)?;
+        json_file::write(path, &report)?;
     }
     say!("Films of the seeds {}:", merged.header.seeds.in_words());
     say!("{}", summary(&report, &settings, &rendered, Interrupter::Signal));

@@ -3,7 +3,6 @@
 use super::CALL_AGAIN;
 use super::console::Console;
 use super::job::{JobArguments, Prepared};
-use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, SeedsSoFar, Start, Watch};
 use super::maps::{MapTarget, check_map};
 use super::report::{Interrupter, Report, summary};
@@ -20,6 +19,7 @@ use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{self, Rendered, StopReason};
 use fechner::checkpoint::{Header, Origin, SettingsRecord};
 use fechner::integrator::{Crop, PathTracer, TraceSettings};
+use fechner::json_file;
 use fechner::output::rendered::Background;
 use fechner::output::{self, PartOf, PictureFormat};
 use std::ffi::OsStr;
@@ -173,7 +173,7 @@ impl FilesWritten {
             say!("{}", map.write(rendered, settings.limits.visibility_or_threshold())?);
             Ok(())
         }));
-        let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, report));
+        let figures = arguments.json.as_ref().map_or(Ok(()), |path| Ok(json_file::write(path, report)?));
         Self { picture, maps, figures }
     }
 }

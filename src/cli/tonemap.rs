@@ -8,13 +8,13 @@ use self::names::{frame_numbers, frames_since_last, targets};
 use self::write::write;
 use super::animate::parse_lapse_rate;
 use super::covered::Covered;
-use super::json::write_json;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
 use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, display_help, operator_values_or_all};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::animate::USUAL_FRAMES_PER_SECOND;
+use fechner::json_file;
 use fechner::output::{self, PartOf, PictureFormat, Shown};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
@@ -205,7 +205,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
         answer!("{}: {}", target.display(), fitted.describe());
     }
     if let (Some(path), Some(state)) = (&arguments.state, eye.and_then(|eye| eye.state)) {
-        write_json(path, &state)?;
+        json_file::write(path, &state)?;
     }
     Ok(())
 }

@@ -9,8 +9,10 @@ use crate::adaptive::state::RenderState;
 use crate::adaptive::{Ended, Monitor, Next, beginning, decide};
 use crate::checkpoint::{CheckpointError, Header, read_checkpoint, write_checkpoint};
 use crate::integrator::PathTracer;
+use crate::json_file;
 use crate::output::OutputError;
 use crate::sealed::SealedError;
+use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
@@ -158,12 +160,12 @@ pub fn finish(
     farm: &Farm,
     frame_index: usize,
     kept: Option<(&Header, &RenderState)>,
-    result: &[u8],
+    result: &impl Serialize,
 ) -> Result<(), OutputError> {
     if let Some((header, state)) = kept {
         write_checkpoint(&farm.finished_film(frame_index), header, state)?;
     }
-    crate::output::write_beside(&farm.result(frame_index), |file| std::io::Write::write_all(file, result))?;
+    json_file::write(&farm.result(frame_index), result)?;
     clear_before(farm, frame_index, u32::MAX);
     std::fs::remove_file(farm.film(frame_index)).ok();
     Ok(())

@@ -12,7 +12,6 @@ use super::settings::shot_settings;
 use super::source::FileSource;
 use super::{AnimateArguments, AovNames, EyeChoice, VelocityChoice};
 use crate::cli::console::Console;
-use crate::cli::json::write_json;
 use crate::cli::report::Report;
 use crate::cli::seeing::Presentation;
 use crate::cli::targets::{Named, check_kept, check_scene_kept};
@@ -23,6 +22,7 @@ use fechner::animate::track::Track;
 use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
 use fechner::checkpoint::SettingsRecord;
 use fechner::denoise::Denoiser;
+use fechner::json_file;
 use fechner::output::rendered::{Background, layers, write_display_png};
 use fechner::output::{self, Attribute, PictureFormat};
 use fechner::scene::Scene;
@@ -270,7 +270,7 @@ impl<'a> Shot<'a> {
             seconds_of_shot: self.settings.seconds(f64::from(frame)),
             report: serde_json::to_value(&report).context("the report could not be put into words")?,
         };
-        write_json(&FrameRecord::file(&file), &record)?;
+        json_file::write(&FrameRecord::file(&file), &record)?;
         say!("{}: {}", file.display(), report.in_a_line());
         Ok(report)
     }

@@ -128,8 +128,7 @@ pub(super) fn merge(worker: &Worker<'_>, frame_index: usize, lock: &Lock) -> Res
             let kept = farm.manifest().keeps_films.then(|| state.clone());
             let rendered = Rendered::new(state, look.judgement, look.stop_reason);
             let report = frame.write(farm, frame_index, rendered)?;
-            let text = serde_json::to_vec_pretty(&report).context("the report could not be put into words")?;
-            finish(farm, frame_index, kept.as_ref().map(|state| (frame.header(), state)), &text)?;
+            finish(farm, frame_index, kept.as_ref().map(|state| (frame.header(), state)), &report)?;
             Ok(MergeWent::On)
         }
     }

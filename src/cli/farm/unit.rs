@@ -13,6 +13,7 @@ use fechner::farm::frame::{Progress, progress};
 use fechner::farm::unit::{Keeping, NamedOrder, Outcome, UnitError, UnitSums, render_unit};
 use fechner::farm::{Farm, UnitPlace, frame};
 use fechner::integrator::PathTracer;
+use fechner::json_file;
 use fechner::lock::{Lock, try_lock, wait_for_lock};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -96,7 +97,7 @@ pub(super) fn run(arguments: &UnitArguments) -> Result<ExitCode> {
 
 /// Plans that a finished frame took, by its figures: rounds are numbered by the plans before them.
 fn plans_of_finished(farm: &Farm, frame_index: usize) -> Option<u32> {
-    let figures: serde_json::Value = serde_json::from_slice(&std::fs::read(farm.result(frame_index)).ok()?).ok()?;
+    let figures: serde_json::Value = json_file::read(&farm.result(frame_index))?;
     figures["plans"].as_u64()?.try_into().ok()
 }
 
