@@ -32,7 +32,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// What a frame is made from and judged by.
-pub(in crate::cli) struct FrameJob {
+pub(in crate::cli) struct ShotFrame {
     pub(in crate::cli) scenes: FrameScenes,
     pub(in crate::cli) settings: LoopSettings,
     /// All that its file depends on, as a name.
@@ -223,7 +223,7 @@ impl<'a> Shot<'a> {
     }
 
     /// What a frame is made from and judged by.
-    pub(in crate::cli) fn frame(&self, frame: u32, track: &Track) -> Result<FrameJob> {
+    pub(in crate::cli) fn frame(&self, frame: u32, track: &Track) -> Result<ShotFrame> {
         self.frame_of_track(frame, track)?.with_context(|| {
             format!(
                 "frame {frame}: its scene has changed since {} was made: call again; a farm must be planned anew",
@@ -233,7 +233,7 @@ impl<'a> Shot<'a> {
     }
 
     /// The same; `None` where the track is not of the frame's scene.
-    fn frame_of_track(&self, frame: u32, track: &Track) -> Result<Option<FrameJob>> {
+    fn frame_of_track(&self, frame: u32, track: &Track) -> Result<Option<ShotFrame>> {
         let scenes = FrameScenes::load(&self.source, &self.settings, frame)?;
         let operator = self.operator()?;
         let Some(of_track) = track.of_frame(&self.settings, operator.as_ref(), frame, &scenes.now) else {
@@ -241,7 +241,7 @@ impl<'a> Shot<'a> {
         };
         let settings = self.settings.frame_settings(operator, of_track);
         let key = self.key(&settings, of_track, &scenes);
-        Ok(Some(FrameJob { scenes, settings, key }))
+        Ok(Some(ShotFrame { scenes, settings, key }))
     }
 
     /// The scene's name in reports.
@@ -255,7 +255,7 @@ impl<'a> Shot<'a> {
     }
 
     /// Writes a frame and its record.
-    pub(in crate::cli) fn keep(&self, frame: u32, job: &FrameJob, made: &RenderedFrame) -> Result<Report> {
+    pub(in crate::cli) fn keep(&self, frame: u32, job: &ShotFrame, made: &RenderedFrame) -> Result<Report> {
         let file = self.file(frame);
         let seed = self.settings.trace_settings(frame).seed;
         let report = Report::new(&self.scene_name(), &[seed], &job.settings, &made.rendered);

@@ -1,6 +1,6 @@
 //! What a farm renders, from the arguments in its manifest: as `render` or `animate` understand them.
 
-use crate::cli::animate::{AnimateArguments, FrameJob as ShotFrame, Shot};
+use crate::cli::animate::{AnimateArguments, Shot, ShotFrame};
 use crate::cli::job::{JobArguments, Prepared};
 use crate::cli::keeper::fit_in;
 use crate::cli::render::write_picture;

@@ -9,7 +9,7 @@ use crate::cli::numbers::parse_seconds;
 use crate::cli::words::{count, listed, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use fechner::farm::frame::{Progress, progress};
+use fechner::farm::frame::{FrameState, progress};
 use fechner::farm::unit::{Keeping, NamedOrder, Outcome, UnitError, UnitSums, render_unit};
 use fechner::farm::{Farm, UnitPlace, frame};
 use fechner::integrator::PathTracer;
@@ -164,9 +164,9 @@ impl<'a> Worker<'a> {
         let place = self.farm.place(unit);
         let number = self.farm.frame(place.frame_index).frame;
         let round = match progress(self.farm, place.frame_index) {
-            Progress::Done => return self.standing_when_done(place),
-            Progress::Open { round, .. } => Some(round),
-            Progress::ToMerge { round } => round,
+            FrameState::Done => return self.standing_when_done(place),
+            FrameState::Open { round, .. } => Some(round),
+            FrameState::ToMerge { round } => round,
         };
         let Some(round) = round else {
             return Standing::Unknown(format!("frame {number} has no round yet; fechner farm merge makes one"));
