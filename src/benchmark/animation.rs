@@ -123,6 +123,15 @@ impl SceneSource for Files<'_> {
 /// Displayed light of each frame, linear RGB in cd/m².
 type Frames = Vec<Vec<f32>>;
 
+/// How the frames of a shot are judged.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Rule {
+    /// For people who see each for as long as it lasts.
+    ForMotion,
+    /// For people who may pause at any.
+    ForStills,
+}
+
 /// Frames of a shot.
 struct Rendition {
     /// Mean samples a pixel.
@@ -190,9 +199,9 @@ impl<'a> Bench<'a> {
             video_jod(&self.shot.viewing.display, size, rate, [frames, reference.clone()])
         };
         let Rendition { spp: motion_spp, frames: motion } =
-            self.adaptive(&self.variant(false, self.shot.limits), &self.track)?;
+            self.adaptive(&self.variant(Rule::ForMotion, self.shot.limits), &self.track)?;
         let Rendition { spp: still_spp, frames: still } =
-            self.adaptive(&self.variant(true, self.shot.limits), &self.track)?;
+            self.adaptive(&self.variant(Rule::ForStills, self.shot.limits), &self.track)?;
         let Rendition { spp: budget_spp, frames: of_budget } = self.with_budget(motion_spp.round() as u32)?;
         let tracers: Vec<PathTracer> = (0..self.scenes.len()).map(|index| self.tracer(index, 0)).collect();
         let judge = FlickerJudge::new(&reference, &tracers, &self.scenes, &self.shot.viewing)?;
@@ -222,10 +231,10 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// The shot for people who may pause it or not, within other limits.
-    fn variant(&self, pausable: bool, limits: Limits) -> ShotSettings {
+    /// The shot by one of the rules, within other limits.
+    fn variant(&self, rule: Rule, limits: Limits) -> ShotSettings {
         ShotSettings {
-            pausable,
+            pausable: rule == Rule::ForStills,
             limits,
             viewing: self.shot.viewing.clone(),
             gaze: None,
@@ -251,7 +260,7 @@ impl<'a> Bench<'a> {
     /// The frames of a budget for the whole shot, as `animate --spp` spends it.
     fn with_budget(&self, mean_samples: u32) -> Result<Rendition> {
         let limits = Limits { visibility: None, mean_samples: Some(mean_samples), ..self.shot.limits };
-        let shot = self.variant(false, limits);
+        let shot = self.variant(Rule::ForMotion, limits);
         let operator = || tone_operator(&self.first_scene).expect("the shot was shown by it");
         let mut track = Track::make(&self.source, &shot, operator().as_ref(), &|_| {})?;
         let needs = Needs::of(&self.source, &shot, &operator, &track)?;

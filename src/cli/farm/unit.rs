@@ -201,24 +201,39 @@ impl<'a> Worker<'a> {
                 return Ok(Went::HasNoOrder);
             }
         };
-        let sums = self.farm.unit_file(unit, "sums");
-        match UnitSums::read(&sums, &order) {
-            Ok(_) => {
-                say!("unit {unit}: is there");
-                return Ok(Went::WasThere);
-            }
+        if self.is_rendered(&order) {
+            say!("unit {unit}: is there");
+            return Ok(Went::WasThere);
+        }
+        let begun = self.begun(&order);
+        self.execute(&order, begun)
+    }
+
+    /// Whether a unit's result is there; one that is refused is put aside.
+    fn is_rendered(&self, order: &NamedOrder) -> bool {
+        let sums = self.farm.unit_file(order.order.unit, "sums");
+        match UnitSums::read(&sums, order) {
+            Ok(_) => return true,
             Err(error) if error.is_missing() => {}
             Err(error) => self.refuse(&sums, &error),
         }
-        let partial = self.farm.unit_file(unit, "partial");
-        let begun = match UnitSums::read_beginning(&partial, &order) {
-            Ok(begun) => Some(begun),
-            Err(error) if error.is_missing() => None,
-            Err(error) => {
-                self.refuse(&partial, &error);
-                None
-            }
-        };
+        false
+    }
+
+    /// The sums of a unit's checkpoint, if there is one; one that is refused is put aside.
+    fn begun(&self, order: &NamedOrder) -> Option<UnitSums> {
+        let partial = self.farm.unit_file(order.order.unit, "partial");
+        match UnitSums::read_beginning(&partial, order) {
+            Ok(begun) => return Some(begun),
+            Err(error) if error.is_missing() => {}
+            Err(error) => self.refuse(&partial, &error),
+        }
+        None
+    }
+
+    /// Traces what is not begun of an order.
+    fn execute(&mut self, order: &NamedOrder, begun: Option<UnitSums>) -> Result<Went> {
+        let unit = order.order.unit;
         let there = begun.as_ref().map_or(0, |begun| begun.sums.len());
         if there > 0 {
             say!("unit {unit}: goes on from its checkpoint, {there} of {}", count(order.order.blocks.len(), "block"));
@@ -228,7 +243,7 @@ impl<'a> Worker<'a> {
         let tracer = self.tracer(farm.place(unit).frame_index)?;
         let loaded = started.elapsed();
         let keeping = Keeping { every, wish: &|| signals.wish() };
-        match render_unit(farm, &order, begun, tracer, &keeping)? {
+        match render_unit(farm, order, begun, tracer, &keeping)? {
             Outcome::Left => {
                 say!("unit {unit}: left by a signal; its checkpoint is there");
                 Ok(Went::Left)
