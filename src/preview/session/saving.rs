@@ -14,8 +14,9 @@ impl Session<'_> {
             self.problems.meet(Cause::Save, "not saved: the picture has no samples yet".to_owned());
             return;
         }
-        let was_looked_at = self.last_look.is_some();
-        let Some(LastLook { judgement, stop_reason }) = self.last_look.take().or_else(|| self.look_to_save()) else {
+        let was_looked_at = self.rest_look.last.is_some();
+        let Some(LastLook { judgement, stop_reason }) = self.rest_look.last.take().or_else(|| self.look_to_save())
+        else {
             self.problems.meet(Cause::Save, "not saved: the picture cannot be looked at".to_owned());
             return;
         };
@@ -30,7 +31,7 @@ impl Session<'_> {
         }
         let Rendered { judgement, stop_reason, .. } = rendered;
         if was_looked_at {
-            self.last_look = Some(LastLook { judgement, stop_reason });
+            self.rest_look.last = Some(LastLook { judgement, stop_reason });
         } else if matches!(self.phase, Phase::Paused | Phase::Stopped) {
             self.looked_at_rest(judgement);
         }
