@@ -27,6 +27,7 @@ pub mod geometry;
 pub mod hdr_read;
 pub mod integrator;
 pub mod jpeg_read;
+pub mod json_file;
 pub mod light;
 pub mod lock;
 pub mod output;

@@ -89,8 +89,17 @@ fn spread(index: u32, irrational: f64) -> f32 {
     (f64::from(index + 1) * irrational).fract() as f32
 }
 
+/// Where the normals of a sheet point.
+#[derive(Clone, Copy)]
+enum Facing {
+    /// Along the cross product of the ways that v and u run.
+    Up,
+    /// Against it.
+    Down,
+}
+
 /// A mesh with outward, unit normals left out (flat shading) and texture coordinates.
-fn grid_sheet(mesh: &mut Mesh, columns: u32, rows: u32, place: impl Fn(f32, f32) -> Vec3, facing_up: bool) {
+fn grid_sheet(mesh: &mut Mesh, columns: u32, rows: u32, place: impl Fn(f32, f32) -> Vec3, facing: Facing) {
     let first = mesh.positions.len() as u32;
     for row in 0..=rows {
         for column in 0..=columns {
@@ -103,7 +112,10 @@ fn grid_sheet(mesh: &mut Mesh, columns: u32, rows: u32, place: impl Fn(f32, f32)
         for column in 0..columns {
             let a = first + row * (columns + 1) + column;
             let (b, c, d) = (a + 1, a + columns + 1, a + columns + 2);
-            let pair = if facing_up { [[a, c, b], [b, c, d]] } else { [[a, b, c], [b, d, c]] };
+            let pair = match facing {
+                Facing::Up => [[a, c, b], [b, c, d]],
+                Facing::Down => [[a, b, c], [b, d, c]],
+            };
             mesh.triangles.extend(pair);
         }
     }
@@ -121,7 +133,7 @@ pub(crate) fn cave_mesh(size: CaveSize) -> Mesh {
             let (x, z) = flat(u, v);
             Vec3::new(x, relief(x, z), z)
         },
-        true,
+        Facing::Up,
     );
     grid_sheet(
         &mut mesh,
@@ -131,7 +143,7 @@ pub(crate) fn cave_mesh(size: CaveSize) -> Mesh {
             let (x, z) = flat(u, v);
             Vec3::new(x, 1.0 + relief(z, x), z)
         },
-        false,
+        Facing::Down,
     );
     for (side, x, z) in [(0, -1.0, 0.0), (1, 1.0, 0.0), (2, 0.0, -1.0), (3, 0.0, 1.0)] {
         grid_sheet(
@@ -143,7 +155,7 @@ pub(crate) fn cave_mesh(size: CaveSize) -> Mesh {
                 let y = -0.2 + 1.4 * v;
                 if side < 2 { Vec3::new(x, y, along) } else { Vec3::new(along, y, z) }
             },
-            true,
+            Facing::Up,
         );
     }
     for boulder in 0..BOULDERS {
@@ -167,7 +179,7 @@ pub(crate) fn cave_mesh(size: CaveSize) -> Mesh {
                 let bumps = (9.0 * direction.x + phase).sin() * (8.0 * direction.y).sin() * (7.0 * direction.z).cos();
                 center + direction * (radius * (1.0 + 0.08 * bumps))
             },
-            true,
+            Facing::Up,
         );
     }
     mesh

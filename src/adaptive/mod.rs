@@ -127,7 +127,7 @@ struct Loop<'a> {
     state: RenderState,
     resumed_at: Instant,
     seconds_before: f64,
-    looked: Option<Looked>,
+    looked: Option<LookTaken>,
     /// [`small_things::samples_to_meet`] lamps smaller than a pixel, once it was asked for.
     samples_to_meet_lamps: OnceCell<Option<Vec<u32>>>,
 }
@@ -137,7 +137,7 @@ type Judge = fn(&Film, &LoopSettings, f64) -> Result<Judgement, JudgeError>;
 
 /// The last look of this run.
 #[derive(Clone, Copy, Debug)]
-struct Looked {
+struct LookTaken {
     at_samples: u64,
     seconds: f64,
 }
@@ -309,7 +309,7 @@ impl<'a> Loop<'a> {
         let judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
         self.state.seconds.denoising += judgement.seconds_denoising;
         let at_samples = self.state.film.total_samples();
-        self.looked = Some(Looked { at_samples, seconds: started.elapsed().as_secs_f64() });
+        self.looked = Some(LookTaken { at_samples, seconds: started.elapsed().as_secs_f64() });
         Ok(judgement)
     }
 

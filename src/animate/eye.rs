@@ -77,29 +77,16 @@ impl ShotSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::adaptive::settings::{Limits, Sampling};
+    use crate::adaptive::settings::Limits;
     use crate::animate::gaze::GazeTrack;
-    use crate::animate::velocity::VelocityOf;
     use crate::integrator::TraceSettings;
     use fechner_perception::display::Viewing;
 
     fn shot(eye: Eye, gaze: Option<&str>) -> ShotSettings {
-        ShotSettings {
-            first: 0,
-            last: 9,
-            frames_per_second: 24.0,
-            pausable: false,
-            trace: TraceSettings::new(100, 50, 0),
-            sampling: Sampling::Adaptive,
-            limits: Limits::of_visibility(1.0),
-            viewing: Viewing::of(Display { pixels_per_degree: 40.0, ..Display::default() }),
-            nits_per_unit: 1.0,
-            adapted_to_cd_m2: None,
-            gaze: gaze.map(|table| GazeTrack::parse(table).expect("a track")),
-            eye,
-            denoiser: None,
-            velocity_of: VelocityOf::Surface,
-        }
+        let viewing = Viewing::of(Display { pixels_per_degree: 40.0, ..Display::default() });
+        let gaze = gaze.map(|table| GazeTrack::parse(table).expect("a track"));
+        let trace = TraceSettings::new(100, 50, 0);
+        ShotSettings { last: 9, gaze, eye, ..ShotSettings::new(24.0, trace, Limits::of_visibility(1.0), viewing, 1.0) }
     }
 
     fn moving() -> VelocityMap {

@@ -92,6 +92,33 @@ pub struct ShotSettings {
 }
 
 impl ShotSettings {
+    /// Of frame 0 alone, spread adaptively, raw, for eyes that rest anywhere and are not told to pause. `trace` has the seed that frames'
+    /// own are made from, `nits_per_unit` is the luminance in cd/m² of RGB (1, 1, 1).
+    pub fn new(
+        frames_per_second: f64,
+        trace: TraceSettings,
+        limits: Limits,
+        viewing: Viewing,
+        nits_per_unit: f64,
+    ) -> Self {
+        Self {
+            first: 0,
+            last: 0,
+            frames_per_second,
+            pausable: false,
+            trace,
+            sampling: Sampling::Adaptive,
+            limits,
+            viewing,
+            nits_per_unit,
+            adapted_to_cd_m2: None,
+            gaze: None,
+            eye: Eye::Rests,
+            denoiser: None,
+            velocity_of: VelocityOf::Surface,
+        }
+    }
+
     /// Time of a frame in seconds.
     pub fn seconds(&self, frame: f64) -> f64 {
         frame / self.frames_per_second

@@ -239,9 +239,7 @@ fn enlarged(looks: &[Look], shot: &ShotSettings) -> SceneLight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::adaptive::settings::{Limits, Sampling};
-    use crate::animate::eye::Eye;
-    use crate::animate::velocity::VelocityOf;
+    use crate::adaptive::settings::Limits;
     use crate::integrator::Crop;
     use crate::scene::load::{LoadOptions, load};
     use fechner_perception::display::Viewing;
@@ -257,22 +255,8 @@ mod tests {
     }
 
     fn shot_of_a_frame((width, height): (u32, u32)) -> ShotSettings {
-        ShotSettings {
-            first: 0,
-            last: 0,
-            frames_per_second: 24.0,
-            pausable: false,
-            trace: TraceSettings::new(width, height, 0),
-            sampling: Sampling::Adaptive,
-            limits: Limits::of_visibility(1.0),
-            viewing: Viewing::default(),
-            nits_per_unit: 1.0,
-            adapted_to_cd_m2: None,
-            gaze: None,
-            eye: Eye::Rests,
-            denoiser: None,
-            velocity_of: VelocityOf::Surface,
-        }
+        let trace = TraceSettings::new(width, height, 0);
+        ShotSettings::new(24.0, trace, Limits::of_visibility(1.0), Viewing::default(), 1.0)
     }
 
     /// Looks are traced as frames are: a track of other light would be another one. A part has the track of the whole.

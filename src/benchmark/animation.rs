@@ -5,22 +5,20 @@
 //! stills.
 
 use super::flicker::{FlickerJudge, Steadiness};
-use super::keep::keep;
 use super::metrics::video_jod;
 use super::name::distinct_names;
 use super::reached::Reached;
 use super::reference::trace_up_to;
 use super::{tone_operator, viewing};
-use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings, Sampling};
+use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings};
 use crate::adaptive::{Quiet, render};
 use crate::animate::budget::Needs;
-use crate::animate::eye::Eye;
 use crate::animate::track::Track;
-use crate::animate::velocity::VelocityOf;
 use crate::animate::{SceneSource, ShotSettings};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use crate::film::Film;
 use crate::integrator::{PathTracer, TraceSettings};
+use crate::json_file;
 use crate::sampler::hash_words;
 use crate::scene::Scene;
 use crate::scene::load::{LoadError, LoadOptions, load};
@@ -105,7 +103,7 @@ impl AnimationResults {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(results: &[Self], file: &Path) -> Result<()> {
-        keep(file, results)
+        Ok(json_file::write(file, results)?)
     }
 }
 
@@ -124,6 +122,15 @@ impl SceneSource for Files<'_> {
 
 /// Displayed light of each frame, linear RGB in cd/m².
 type Frames = Vec<Vec<f32>>;
+
+/// How the frames of a shot are judged.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Rule {
+    /// For people who see each for as long as it lasts.
+    ForMotion,
+    /// For people who may pause at any.
+    ForStills,
+}
 
 /// Frames of a shot.
 struct Rendition {
@@ -170,21 +177,12 @@ impl<'a> Bench<'a> {
             limits.pilot_samples = DENOISED_PILOT_SAMPLES_A_PIXEL;
         }
         let first = (START_S * rate).round() as u32;
+        let trace = TraceSettings::new(settings.size.0, settings.size.1, 0);
         let shot = ShotSettings {
             first,
             last: first + settings.frames - 1,
-            frames_per_second: rate,
-            pausable: false,
-            trace: TraceSettings::new(settings.size.0, settings.size.1, 0),
-            sampling: Sampling::Adaptive,
-            limits,
-            viewing,
-            nits_per_unit: first_scene.nits_per_unit,
-            adapted_to_cd_m2: None,
-            gaze: None,
             denoiser,
-            eye: Eye::Rests,
-            velocity_of: VelocityOf::Surface,
+            ..ShotSettings::new(rate, trace, limits, viewing, first_scene.nits_per_unit)
         };
         let operator = tone_operator(&first_scene)?;
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;
@@ -201,9 +199,9 @@ impl<'a> Bench<'a> {
             video_jod(&self.shot.viewing.display, size, rate, [frames, reference.clone()])
         };
         let Rendition { spp: motion_spp, frames: motion } =
-            self.adaptive(&self.variant(false, self.shot.limits), &self.track)?;
+            self.adaptive(&self.variant(Rule::ForMotion, self.shot.limits), &self.track)?;
         let Rendition { spp: still_spp, frames: still } =
-            self.adaptive(&self.variant(true, self.shot.limits), &self.track)?;
+            self.adaptive(&self.variant(Rule::ForStills, self.shot.limits), &self.track)?;
         let Rendition { spp: budget_spp, frames: of_budget } = self.with_budget(motion_spp.round() as u32)?;
         let tracers: Vec<PathTracer> = (0..self.scenes.len()).map(|index| self.tracer(index, 0)).collect();
         let judge = FlickerJudge::new(&reference, &tracers, &self.scenes, &self.shot.viewing)?;
@@ -233,10 +231,10 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// The shot for people who may pause it or not, within other limits.
-    fn variant(&self, pausable: bool, limits: Limits) -> ShotSettings {
+    /// The shot by one of the rules, within other limits.
+    fn variant(&self, rule: Rule, limits: Limits) -> ShotSettings {
         ShotSettings {
-            pausable,
+            pausable: rule == Rule::ForStills,
             limits,
             viewing: self.shot.viewing.clone(),
             gaze: None,
@@ -262,7 +260,7 @@ impl<'a> Bench<'a> {
     /// The frames of a budget for the whole shot, as `animate --spp` spends it.
     fn with_budget(&self, mean_samples: u32) -> Result<Rendition> {
         let limits = Limits { visibility: None, mean_samples: Some(mean_samples), ..self.shot.limits };
-        let shot = self.variant(false, limits);
+        let shot = self.variant(Rule::ForMotion, limits);
         let operator = || tone_operator(&self.first_scene).expect("the shot was shown by it");
         let mut track = Track::make(&self.source, &shot, operator().as_ref(), &|_| {})?;
         let needs = Needs::of(&self.source, &shot, &operator, &track)?;

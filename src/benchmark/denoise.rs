@@ -4,7 +4,7 @@
 //! tile with what can truly be seen of their error, and (2) spends growing budgets by three rules and reads off where the
 //! denoised pictures reach a quality by metrics that none of them optimises (`race.rs`). Not for animation.
 
-use super::keep::{keep, kept_or_made};
+use super::keep::kept_or_made;
 use super::metrics::Metrics;
 use super::name::distinct_names;
 use super::race::{Race, RaceMean, RacePoint, RaceRule, compare_with_uniform, means};
@@ -12,9 +12,10 @@ use super::reference::Reference;
 use super::truth::Truth;
 use super::{BenchSettings, Subject, check_inputs, make_folders};
 use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, LoopSettings, RivalRule, Sampling};
-use crate::adaptive::{Quiet, render};
+use crate::adaptive::{Quiet, Rendered, render};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use crate::integrator::PILOT_SAMPLES_A_PIXEL;
+use crate::json_file;
 use anyhow::Result;
 use fechner_perception::Plane;
 use fechner_perception::denoised::VISIBLY_WRONG;
@@ -135,7 +136,7 @@ pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<Den
     if settings.with_races {
         results.race_means = means(&results.races);
     }
-    keep(&settings.bench.output.join("denoise.json"), &results)?;
+    json_file::write(&settings.bench.output.join("denoise.json"), &results)?;
     Ok(results)
 }
 
@@ -160,51 +161,58 @@ impl SceneBench<'_> {
         self.truth.measure(&self.truth.displayed(rgb_cd_m2))
     }
 
-    fn calibration(&self, denoiser: &Denoiser, spp: u32, seed: u64) -> Result<Calibration> {
+    /// An even render that is denoised and judged by one look, at its end.
+    fn judged_at_end(&self, denoiser: &Denoiser, spp: u32, seed: u64) -> Result<Rendered> {
         let mut settings = self.loop_settings(denoiser, spp)?;
         settings.sampling = Sampling::Uniform;
         settings.limits.visibility = None;
-        // One look, at the end.
         settings.limits.pilot_samples = spp;
-        let rendered = render(&self.subject.tracer(seed), &settings, &Quiet)?;
+        Ok(render(&self.subject.tracer(seed), &settings, &Quiet)?)
+    }
+
+    fn calibration(&self, denoiser: &Denoiser, spp: u32, seed: u64) -> Result<Calibration> {
+        let rendered = self.judged_at_end(denoiser, spp, seed)?;
         let found = &rendered.judgement;
         let picture = found.denoised.as_ref().ok_or_else(|| anyhow::anyhow!("the picture was denoised"))?;
         let true_energy = self.truth.squared_visibility(&self.truth.displayed(&picture.rgb_cd_m2));
         let predicted = found.predicted.map(|v| v * v);
-        let unproven = tiles(&picture.error.unproven(self.settings.target));
-        let (wrong, fine) = (f64::from(VISIBLY_WRONG) * self.settings.target, self.settings.target);
-        let truths: Vec<f64> = tiles(&true_energy).into_iter().map(f64::sqrt).collect();
-        let predictions: Vec<f64> = tiles(&predicted).into_iter().map(f64::sqrt).collect();
-        let share =
-            |is: &dyn Fn(usize) -> bool| (0..truths.len()).filter(|&i| is(i)).count() as f64 / truths.len() as f64;
-        let is_fine = |i: usize| predictions[i] <= fine;
-        let is_unproven = |i: usize| is_fine(i) && unproven[i] > 0.5;
+        let tiles = JudgedTiles {
+            predictions: tiles(&predicted).into_iter().map(f64::sqrt).collect(),
+            truths: tiles(&true_energy).into_iter().map(f64::sqrt).collect(),
+            unproven: tiles(&picture.error.unproven(self.settings.target)),
+            target: self.settings.target,
+        };
         let mean_square = |plane: &Plane| plane.map(|v| v * v).mean();
         let over_true = |energy: f64| Some((energy / true_energy.mean()).sqrt()).filter(|ratio| ratio.is_finite());
+        let seconds_tracing = rendered.seconds.total - rendered.seconds.perception;
         let (raw, denoised) = (self.measured(&found.estimate.rgb_cd_m2)?, self.measured(&picture.rgb_cd_m2)?);
-        let tracing = rendered.seconds.total - rendered.seconds.perception;
-        let started = Instant::now();
-        denoise_film(denoiser, &rendered.film, settings.nits_per_unit)?;
         Ok(Calibration {
             scene: self.subject.name.clone(),
             denoiser: denoiser.name(),
             spp,
             seed,
-            rank_correlation: rank_correlation(&predictions, &truths),
+            rank_correlation: rank_correlation(&tiles.predictions, &tiles.truths),
             predicted_over_true: over_true(predicted.mean()),
             variance_over_true: over_true(mean_square(&picture.error.variance)),
-            wrong_share: share(&|i| is_fine(i) && !is_unproven(i) && truths[i] > wrong),
-            wrong_unproven_share: share(&|i| is_unproven(i) && truths[i] > wrong),
-            fine_share: share(&is_fine),
-            unproven_share: share(&is_unproven),
-            truly_wrong_share: share(&|i| truths[i] > wrong),
+            wrong_share: tiles.share(|i| tiles.is_fine(i) && !tiles.is_unproven(i) && tiles.is_wrong(i)),
+            wrong_unproven_share: tiles.share(|i| tiles.is_unproven(i) && tiles.is_wrong(i)),
+            fine_share: tiles.share(|i| tiles.is_fine(i)),
+            unproven_share: tiles.share(|i| tiles.is_unproven(i)),
+            truly_wrong_share: tiles.share(|i| tiles.is_wrong(i)),
             bias_factors: picture.error.bias_factors.clone(),
             jod_raw: raw.jod,
             jod: denoised.jod,
             flip_raw: raw.flip_mean,
             flip: denoised.flip_mean,
-            overhead: started.elapsed().as_secs_f64() / tracing,
+            overhead: self.seconds_denoising(denoiser, &rendered)? / seconds_tracing,
         })
+    }
+
+    /// What it takes to denoise the mean and both halves, by the clock.
+    fn seconds_denoising(&self, denoiser: &Denoiser, rendered: &Rendered) -> Result<f64> {
+        let started = Instant::now();
+        denoise_film(denoiser, &rendered.film, self.subject.scene.nits_per_unit)?;
+        Ok(started.elapsed().as_secs_f64())
     }
 
     fn race(&self, denoiser: &Denoiser, rule: RaceRule) -> Result<Race> {
@@ -254,6 +262,37 @@ impl SceneBench<'_> {
         let key = &blake3::hash(text.as_bytes()).to_hex()[..16];
         let name = format!("{}-{key}-denoised-{what}-{spp}-{seed}.json", self.subject.file_name());
         self.settings.bench.output.join("runs").join(name)
+    }
+}
+
+/// What is predicted of the tiles of a picture, and what is true.
+struct JudgedTiles {
+    /// Predicted visibility.
+    predictions: Vec<f64>,
+    /// True visibility.
+    truths: Vec<f64>,
+    /// How much of each tile is unproven, from 0 to 1.
+    unproven: Vec<f64>,
+    /// Visibility up to which tiles are called fine.
+    target: f64,
+}
+
+impl JudgedTiles {
+    fn is_fine(&self, tile: usize) -> bool {
+        self.predictions[tile] <= self.target
+    }
+
+    fn is_unproven(&self, tile: usize) -> bool {
+        self.is_fine(tile) && self.unproven[tile] > 0.5
+    }
+
+    fn is_wrong(&self, tile: usize) -> bool {
+        self.truths[tile] > f64::from(VISIBLY_WRONG) * self.target
+    }
+
+    /// Of how many of all tiles this holds.
+    fn share(&self, holds: impl Fn(usize) -> bool) -> f64 {
+        (0..self.truths.len()).filter(|&tile| holds(tile)).count() as f64 / self.truths.len() as f64
     }
 }
 

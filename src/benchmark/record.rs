@@ -8,6 +8,7 @@ use super::runner::{EnergyBias, Run};
 use super::summary::{GeometricMean, INTERVAL_LEVEL, geometric_mean};
 use super::table::csv;
 use super::{BenchSettings, COVERAGES, MAIN_COVERAGE};
+use crate::json_file;
 use anyhow::Result;
 use fechner_perception::Plane;
 use serde::Serialize;
@@ -271,8 +272,8 @@ impl Results {
 
     /// Writes `results.json`, `results.csv` and `report.html`.
     pub(crate) fn write(&self, folder: &Path) -> Result<()> {
-        let json = serde_json::to_string_pretty(self)?;
-        for (name, text) in [("results.json", json), ("results.csv", csv(&self.records)), ("report.html", html(self))] {
+        json_file::write(&folder.join("results.json"), self)?;
+        for (name, text) in [("results.csv", csv(&self.records)), ("report.html", html(self))] {
             let path = folder.join(name);
             crate::output::write_beside(&path, |file| std::io::Write::write_all(file, text.as_bytes()))?;
         }

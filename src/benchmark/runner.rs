@@ -2,7 +2,7 @@
 
 use super::arm::Arm;
 use super::curve::{Curve, course};
-use super::keep::{keep, keep_pixels, kept, kept_or_made, kept_pixels};
+use super::keep::{keep_pixels, kept_or_made, kept_pixels};
 use super::knob::nearest;
 use super::metrics::Metrics;
 use super::oracle::{displayed_variance, least_samples, trace_counts, uniform_samples};
@@ -14,6 +14,7 @@ use super::{BenchSettings, MAIN_COVERAGE, Subject};
 use crate::adaptive::statistics::picture_variance;
 use crate::adaptive::{Quiet, Rendered, render};
 use crate::film::Film;
+use crate::json_file;
 use anyhow::{Context, Result};
 use fechner_perception::Plane;
 use serde::{Deserialize, Serialize};
@@ -270,7 +271,7 @@ impl<'a> ArmRunner<'a> {
     }
 
     fn read(&self, file: &Path, say: &dyn Fn(&str)) -> Option<Run> {
-        let mut run: Run = kept(file)?;
+        let mut run: Run = json_file::read(file)?;
         let Reference { width, height, .. } = *self.reference;
         let values = kept_pixels(&file.with_extension("f32"), width * height, say)?;
         run.squared_visibility = Plane::from_values(width, height, values).ok();
@@ -281,7 +282,7 @@ impl<'a> ArmRunner<'a> {
         if let Some(plane) = &run.squared_visibility {
             keep_pixels(&file.with_extension("f32"), plane.values())?;
         }
-        keep(file, run)
+        Ok(json_file::write(file, run)?)
     }
 }
 

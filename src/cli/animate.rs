@@ -26,11 +26,11 @@ use frames::{Frames, parse_frames};
 use shot::Made;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use time::{Progress, ShotClock};
+use time::{FrameTimes, ShotClock};
 use video::VideoFormat;
 
 pub(super) use frames::{parse_lapse_rate, parse_rate};
-pub(super) use shot::{FrameJob, Shot};
+pub(super) use shot::{Shot, ShotFrame};
 
 /// Arguments of `animate`.
 #[derive(Debug, Args)]
@@ -187,14 +187,14 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
     if let (Some(budget), Some(clock)) = (arguments.time, &clock) {
         note_late_start(budget, looked, clock.left());
     }
-    let mut progress = Progress::new(arguments.frame_numbers().map(|frame| shot.has_record(frame)));
+    let mut times = FrameTimes::new(arguments.frame_numbers().map(|frame| shot.has_record(frame)));
     for frame in arguments.frame_numbers() {
         let started = Instant::now();
         let made = shot.make(frame, &track, clock.as_ref().map(|clock| clock.share(frame)))?;
-        progress.add(made, started.elapsed());
+        times.add(made, started.elapsed());
         if made != Made::Kept && frame < arguments.frames.last {
             let (done, count) = (frame - arguments.frames.first + 1, arguments.frame_numbers().count());
-            say!("{done} of {count} frames, about {} left", duration_in_words(progress.seconds_left()));
+            say!("{done} of {count} frames, about {} left", duration_in_words(times.seconds_left()));
         }
     }
     if let (Some(budget), Some(_)) = (arguments.time, clock) {

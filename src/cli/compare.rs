@@ -3,7 +3,6 @@
 mod sequence;
 
 use super::animate::parse_rate;
-use super::json::write_json;
 use super::kept_tone::shown_by;
 use super::maps::check_map;
 use super::picture::{Ground, InputPicture, Shape, Source};
@@ -13,6 +12,7 @@ use super::words::OF_THE_MODEL;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::adaptive::settings::THRESHOLD;
+use fechner::json_file;
 use fechner::output::{self, false_colour};
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
@@ -127,7 +127,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         say!("{}: {}", path.display(), write_map(path, &difference)?);
     }
     if let Some(path) = &arguments.json {
-        write_json(path, &figures)?;
+        json_file::write(path, &figures)?;
     }
     tell(&figures);
     Ok(ExitCode::from(u8::from(figures.seen.is_visible)))

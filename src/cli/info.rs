@@ -177,6 +177,26 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
     decoder.set_limits(png::Limits { bytes: 1 << 28 });
     let mut reader = decoder.read_info().with_context(problem)?;
     let info = reader.info();
+    let bits = info.bit_depth as u8;
+    let mut text =
+        format!("PNG, {}×{} pixels, {:?}, {bits} bits a channel\n", info.width, info.height, info.color_type);
+    let _ = writeln!(text, "colour tags: {}", colour_tags(info));
+
+    let (columns, rows) = (info.width, info.height);
+    let size = reader.output_buffer_size().with_context(problem)?;
+    check_bytes(path, (columns, rows), size as u64)?;
+    let mut pixels = vec![0; size];
+    let frame = reader.next_frame(&mut pixels).with_context(problem)?;
+    pixels.truncate(frame.buffer_size());
+    if bits == 8 || bits == 16 {
+        text.push('\n');
+        write_png_channels(&mut text, &pixels, frame.color_type, bits);
+    }
+    Ok(text)
+}
+
+/// What a PNG's chunks say of its colours.
+fn colour_tags(info: &png::Info<'_>) -> String {
     let mut tags = Vec::new();
     if let Some(intent) = info.srgb {
         tags.push(format!("sRGB ({intent:?})"));
@@ -190,39 +210,26 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
     if let Some(gamma) = info.gama_chunk {
         tags.push(format!("gamma {}", gamma.into_value()));
     }
-    if tags.is_empty() {
-        tags.push("none".to_owned());
-    }
-    let bits = info.bit_depth as u8;
-    let mut text =
-        format!("PNG, {}×{} pixels, {:?}, {bits} bits a channel\n", info.width, info.height, info.color_type);
-    let _ = writeln!(text, "colour tags: {}", tags.join(", "));
+    if tags.is_empty() { "none".to_owned() } else { tags.join(", ") }
+}
 
-    let (columns, rows) = (info.width, info.height);
-    let size = reader.output_buffer_size().with_context(problem)?;
-    check_bytes(path, (columns, rows), size as u64)?;
-    let mut pixels = vec![0; size];
-    let frame = reader.next_frame(&mut pixels).with_context(problem)?;
-    pixels.truncate(frame.buffer_size());
-    if bits == 8 || bits == 16 {
-        let names: &[&str] = match frame.color_type {
-            png::ColorType::Grayscale => &["grey"],
-            png::ColorType::GrayscaleAlpha => &["grey", "alpha"],
-            png::ColorType::Rgb => &["red", "green", "blue"],
-            png::ColorType::Rgba => &["red", "green", "blue", "alpha"],
-            png::ColorType::Indexed => &["index"],
-        };
-        text.push('\n');
-        heading(&mut text, "channel", 7);
-        for (c, name) in names.iter().enumerate() {
-            let bytes = usize::from(bits / 8);
-            // 16 bits have their high byte first; of 8 there is one.
-            let value = |value: &[u8]| f32::from(value.iter().fold(0, |high: u16, &low| (high << 8) | u16::from(low)));
-            let values = pixels.chunks_exact(bytes).skip(c).step_by(names.len()).map(value);
-            Range::of(values).row(&mut text, name, if bits == 8 { "8-bit" } else { "16-bit" }, 7);
-        }
+/// The table of a PNG's channels, whose values have 8 or 16 bits.
+fn write_png_channels(text: &mut String, pixels: &[u8], colour: png::ColorType, bits: u8) {
+    let names: &[&str] = match colour {
+        png::ColorType::Grayscale => &["grey"],
+        png::ColorType::GrayscaleAlpha => &["grey", "alpha"],
+        png::ColorType::Rgb => &["red", "green", "blue"],
+        png::ColorType::Rgba => &["red", "green", "blue", "alpha"],
+        png::ColorType::Indexed => &["index"],
+    };
+    heading(text, "channel", 7);
+    for (c, name) in names.iter().enumerate() {
+        let bytes = usize::from(bits / 8);
+        // 16 bits have their high byte first; of 8 there is one.
+        let value = |value: &[u8]| f32::from(value.iter().fold(0, |high: u16, &low| (high << 8) | u16::from(low)));
+        let values = pixels.chunks_exact(bytes).skip(c).step_by(names.len()).map(value);
+        Range::of(values).row(text, name, if bits == 8 { "8-bit" } else { "16-bit" }, 7);
     }
-    Ok(text)
 }
 
 fn describe_jpeg(path: &Path) -> anyhow::Result<String> {

@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use fechner::adaptive::Rendered;
 use fechner::output::false_colour::{self, Colours};
-use fechner::output::{self, Format};
+use fechner::output::{self, PictureFormat};
 use fechner_perception::Plane;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ pub(super) struct MapTarget {
 
 /// Tells whether a map can be written, before what it shows is made: it is a picture to look at.
 pub(super) fn check_map(path: &Path) -> Result<()> {
-    if output::check_target(path)? != Format::Png {
+    if output::check_target(path)? != PictureFormat::Png {
         bail!("{}: --map writes a picture to look at; end the name in .png", path.display());
     }
     Ok(())

@@ -1,7 +1,6 @@
 //! `fechner merge`: films of different seeds in, one film or its picture out.
 
 use super::claim::Claim;
-use super::json::write_json;
 use super::numbers::parse_positive;
 use super::render::write_picture;
 use super::report::{Interrupter, Report, summary};
@@ -11,8 +10,9 @@ use fechner::adaptive::judge::judge;
 use fechner::adaptive::settings::{Limits, THRESHOLD};
 use fechner::adaptive::{Rendered, StopReason, is_reached};
 use fechner::checkpoint::{merge_files, write_checkpoint};
+use fechner::json_file;
 use fechner::output::rendered::Background;
-use fechner::output::{self, Format};
+use fechner::output::{self, PictureFormat};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `merge`.
@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
             "note: sampled under an importance map (content {map}), which films do not keep: what can be seen is told without it"
         );
     }
-    if format == Some(Format::Exr) && merged.header.settings.frames.is_some() {
+    if format == Some(PictureFormat::Exr) && merged.header.settings.frames.is_some() {
         say!("note: films keep no motion: the picture of this frame is without the velocities that it has in its shot");
     }
     let tracing = *merged.header.origin.tracing.settings();
@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
         write_picture(&arguments.output, format, background, &rendered, &settings, &report, part_of)?;
     }
     if let Some(path) = &arguments.json {
-        write_json(path, &report)?;
+        json_file::write(path, &report)?;
     }
     say!("Films of the seeds {}:", merged.header.seeds.in_words());
     say!("{}", summary(&report, &settings, &rendered, Interrupter::Signal));

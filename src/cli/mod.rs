@@ -12,7 +12,6 @@ mod farm;
 mod importance;
 mod info;
 mod job;
-mod json;
 mod keeper;
 mod kept_tone;
 mod maps;

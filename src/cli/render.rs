@@ -3,7 +3,6 @@
 use super::CALL_AGAIN;
 use super::console::Console;
 use super::job::{JobArguments, Prepared};
-use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, SeedsSoFar, Start, Watch};
 use super::maps::{MapTarget, check_map};
 use super::report::{Interrupter, Report, summary};
@@ -20,11 +19,14 @@ use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{self, Rendered, StopReason};
 use fechner::checkpoint::{Header, Origin, SettingsRecord};
 use fechner::integrator::{Crop, PathTracer, TraceSettings};
+use fechner::json_file;
 use fechner::output::rendered::Background;
-use fechner::output::{self, PartOf};
+use fechner::output::{self, PartOf, PictureFormat};
+use fechner::scene::Scene;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Arguments of `render`.
@@ -73,32 +75,25 @@ fn written(arguments: &RenderArguments) -> Vec<Named<'_>> {
     files.into_iter().chain(arguments.maps.iter().map(|map| ("--map", Some(map.file())))).collect()
 }
 
-fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<ExitCode> {
+fn render_and_write(arguments: &RenderArguments, format: PictureFormat) -> anyhow::Result<ExitCode> {
     let mut prepared = arguments.job.prepare_samples()?;
     check_scene_kept(&written(arguments))?;
     // Of renders that were killed as they wrote.
     written(arguments).into_iter().filter_map(|(_, path)| path).for_each(output::remove_leftovers);
     // A film's picture tells the same of its scene, whether it is written now or by `merge`.
-    let Prepared { scene, trace, record, .. } = &prepared;
+    let Prepared { scene, trace, .. } = &prepared;
     let origin = || Origin { scene_name: arguments.job.scene_name(), ..Origin::of(scene, trace) };
     let origin = arguments.checkpoint.is_wanted().then(origin);
     // From here on SIGINT, SIGTERM and SIGHUP end the render with the picture so far; one that comes seconds later ends the program.
     let stop = listen(|| {})?;
-    let fitting = Instant::now();
-    let kept_fit = origin.as_ref().and_then(|origin| arguments.checkpoint.kept_fit(origin, record));
-    prepared.fit_to_whole(kept_fit);
-    let seconds_fitting = fitting.elapsed().as_secs_f64();
+    let seconds_fitting = seconds_to_fit(arguments, &mut prepared, origin.as_ref());
     let Prepared { scene, trace, record, settings, .. } = prepared;
     let audience = arguments.view.then(|| audience(&scene, &trace, &settings, &record)).transpose()?;
     let Begun { mut state, seeds, keeper } = begin(arguments, origin, &trace, record, &settings)?;
     // A glimpse of the whole is a look, and may take longer than a part.
     state.seconds.total += seconds_fitting;
     state.seconds.perception += seconds_fitting;
-    let tracer = PathTracer::new(scene, trace);
-    let degenerate = tracer.world().degenerate_triangles();
-    if degenerate > 0 {
-        say!("note: {} without area left out", count(degenerate, "triangle"));
-    }
+    let tracer = tracer_of(scene, trace);
     let tev = arguments.tev.open(&arguments.job.scene_name())?.map(|tev| Showing::new(tev, settings.nits_per_unit));
     let watch = Watch::new(stop, Console::new(settings.limits.time), keeper, audience, tev);
     let rendered = adaptive::resume(&tracer, &settings, state, &watch);
@@ -113,13 +108,27 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let report = Report::new(&arguments.job.scene_name(), seeds, &settings, &rendered);
     let files = FilesWritten::try_all(arguments, format, &rendered, &settings, &report, PartOf::of(&trace));
     say!("{}", summary(&report, &settings, &rendered, interrupter));
+    files.or_failures(&arguments.output, watch)?;
     let is_unfinished = rendered.stop_reason == StopReason::Interrupted && interrupter == Interrupter::Signal;
-    let FilesWritten { picture, maps, figures } = files;
-    if picture.is_ok() && (maps.is_err() || figures.is_err()) {
-        say!("note: the picture is in {}", arguments.output.display());
-    }
-    all_written([picture, maps, figures, watch.report()])?;
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
+}
+
+/// Fits tone to the whole of which the picture is a part, as the film of `origin` was fitted if it is kept; what that took by the clock.
+fn seconds_to_fit(arguments: &RenderArguments, prepared: &mut Prepared, origin: Option<&Origin>) -> f64 {
+    let started = Instant::now();
+    let kept_fit = origin.and_then(|origin| arguments.checkpoint.kept_fit(origin, &prepared.record));
+    prepared.fit_to_whole(kept_fit);
+    started.elapsed().as_secs_f64()
+}
+
+/// Makes a scene ready for rays, and says what no ray will meet.
+fn tracer_of(scene: Arc<Scene>, trace: TraceSettings) -> PathTracer {
+    let tracer = PathTracer::new(scene, trace);
+    let degenerate = tracer.world().degenerate_triangles();
+    if degenerate > 0 {
+        say!("note: {} without area left out", count(degenerate, "triangle"));
+    }
+    tracer
 }
 
 /// What a render begins with.
@@ -160,7 +169,7 @@ impl FilesWritten {
     /// Each is tried, whatever became of the others.
     fn try_all(
         arguments: &RenderArguments,
-        format: output::Format,
+        format: PictureFormat,
         rendered: &Rendered,
         settings: &LoopSettings,
         report: &Report,
@@ -173,8 +182,17 @@ impl FilesWritten {
             say!("{}", map.write(rendered, settings.limits.visibility_or_threshold())?);
             Ok(())
         }));
-        let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, report));
+        let figures = arguments.json.as_ref().map_or(Ok(()), |path| Ok(json_file::write(path, report)?));
         Self { picture, maps, figures }
+    }
+
+    /// All that could not be written, the film among it, in one error; where the picture is there, that is said.
+    fn or_failures(self, output: &Path, watch: Watch<'_>) -> anyhow::Result<()> {
+        let Self { picture, maps, figures } = self;
+        if picture.is_ok() && (maps.is_err() || figures.is_err()) {
+            say!("note: the picture is in {}", output.display());
+        }
+        all_written([picture, maps, figures, watch.report()])
     }
 }
 
@@ -210,7 +228,7 @@ fn kept_elsewhere(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>, erro
 /// Writes the picture in the format that its name asks for; a PNG has no place in a whole.
 pub(super) fn write_picture(
     path: &Path,
-    format: output::Format,
+    format: PictureFormat,
     background: Background,
     rendered: &Rendered,
     settings: &LoopSettings,
@@ -218,10 +236,10 @@ pub(super) fn write_picture(
     part_of: Option<PartOf>,
 ) -> anyhow::Result<()> {
     match format {
-        output::Format::Png => {
+        PictureFormat::Png => {
             output::rendered::write_display_png(path, rendered, &settings.viewing.display, background)?;
         }
-        output::Format::Exr => {
+        PictureFormat::Exr => {
             let attributes = report.attributes();
             output::rendered::write_layers_exr(path, rendered, settings, background, &attributes, part_of)?;
         }

@@ -7,7 +7,7 @@ use fechner::adaptive::state::RenderState;
 use fechner::poison::Unpoisoned as _;
 use fechner::preview::{Looked, Shown, Stage, TEV_PORT, Tev};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Where tev listens.
 #[derive(Clone, Debug, Args)]
@@ -86,10 +86,10 @@ impl Showing {
         let (film, nits_per_unit) = (&state.film, self.nits_per_unit);
         let raw = || {
             let pixels = film.pixel_count();
-            (0..pixels).map(|pixel| film.rgb_cd_m2(pixel, nits_per_unit)).collect()
+            Arc::new((0..pixels).map(|pixel| film.rgb_cd_m2(pixel, nits_per_unit)).collect::<Vec<_>>())
         };
         // Denoised pictures are made by looks; between two the last one stays.
-        let rgb_cd_m2: Vec<[f32; 3]> = looked.as_ref().and_then(|looked| looked.denoised.clone()).unwrap_or_else(raw);
+        let rgb_cd_m2 = looked.as_ref().and_then(|looked| looked.denoised.clone()).unwrap_or_else(raw);
         let looked = looked.as_ref();
         tev.offer(&Shown { film, rgb_cd_m2: &rgb_cd_m2, step: 1, looked, nits_per_unit, stage });
     }

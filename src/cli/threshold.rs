@@ -16,7 +16,7 @@ use super::words::OF_THE_MODEL;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::exr_read::ExrImage;
-use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture, attribute, channel};
+use fechner::output::{self, Attribute, PIXEL_ASPECT_RATIO, Picture, PictureFormat, attribute, channel};
 use fechner_perception::colour::chromatic_visibility;
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs, ThresholdModel};
@@ -92,7 +92,7 @@ fn check_targets(arguments: &ThresholdArguments) -> Result<()> {
         arguments.seeing.display_file(),
     ];
     check_kept(&halves.chain(others).collect::<Vec<_>>(), &[("-o", Some(&arguments.output))])?;
-    if output::check_target(&arguments.output)? != Format::Exr {
+    if output::check_target(&arguments.output)? != PictureFormat::Exr {
         bail!("{}: threshold maps are data; end the name in .exr", arguments.output.display());
     }
     Ok(())

@@ -8,14 +8,14 @@ use self::names::{frame_numbers, frames_since_last, targets};
 use self::write::write;
 use super::animate::parse_lapse_rate;
 use super::covered::Covered;
-use super::json::write_json;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
 use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, display_help, operator_values_or_all};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::animate::USUAL_FRAMES_PER_SECOND;
-use fechner::output::{self, Format, PartOf, Shown};
+use fechner::json_file;
+use fechner::output::{self, PartOf, PictureFormat, Shown};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
     ToneSettings, map_picture,
@@ -205,7 +205,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
         answer!("{}: {}", target.display(), fitted.describe());
     }
     if let (Some(path), Some(state)) = (&arguments.state, eye.and_then(|eye| eye.state)) {
-        write_json(path, &state)?;
+        json_file::write(path, &state)?;
     }
     Ok(())
 }
@@ -254,7 +254,7 @@ fn asks_an_operator(arguments: &TonemapArguments) -> bool {
 }
 
 /// Each picture by the operator that it was rendered for.
-fn run_as_rendered(arguments: &TonemapArguments, format: Format, targets: &[PathBuf]) -> Result<()> {
+fn run_as_rendered(arguments: &TonemapArguments, format: PictureFormat, targets: &[PathBuf]) -> Result<()> {
     if asks_an_operator(arguments) {
         bail!("exposure, adaptation, effects, eyes and their time are an operator's: name it by --operator");
     }
@@ -278,7 +278,7 @@ fn run_as_rendered(arguments: &TonemapArguments, format: Format, targets: &[Path
 
 fn run_all(
     arguments: &TonemapArguments,
-    format: Format,
+    format: PictureFormat,
     targets: &[PathBuf],
     viewing: &Viewing,
     settings: &ToneSettings,
@@ -288,7 +288,7 @@ fn run_all(
             "a sheet of all operators shows one picture at rest: give one file and no --fps, --adapted-to or --state"
         );
     }
-    if format != Format::Png {
+    if format != PictureFormat::Png {
         bail!("{}: a sheet of all operators is a picture; end the name in .png", targets[0].display());
     }
     let frame = SceneFrame::read(&arguments.input[0], arguments, viewing)?;

@@ -1,8 +1,9 @@
 //! Where a farm's files are, and how units are numbered.
 
-use super::manifest::{FrameEntry, Manifest, ManifestError, PictureFormat, Work};
+use super::manifest::{FrameEntry, Manifest, ManifestError, Work};
 use crate::animate::name::FrameName;
-use crate::output::{OutputError, write_beside};
+use crate::json_file;
+use crate::output::{OutputError, PictureFormat, write_beside};
 use crate::read_file;
 use crate::scene::hash::ContentHash;
 use std::io::Write as _;
@@ -38,8 +39,7 @@ impl Farm {
     /// If it cannot be written, as where the name of its directory is not Unicode.
     pub fn create(folder: &Path, manifest: Manifest) -> Result<Self, OutputError> {
         let path = Self::manifest_file(folder);
-        let text = serde_json::to_vec_pretty(&manifest)
-            .map_err(|error| OutputError::Io { path: path.clone(), error: error.into() })?;
+        let text = json_file::indented(&path, &manifest)?;
         write_beside(&path, |file| file.write_all(&text))?;
         Ok(Self { folder: folder.to_owned(), manifest, id: ContentHash::of_bytes(&text) })
     }

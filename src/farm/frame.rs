@@ -9,15 +9,17 @@ use crate::adaptive::state::RenderState;
 use crate::adaptive::{Ended, Monitor, Next, beginning, decide};
 use crate::checkpoint::{CheckpointError, Header, read_checkpoint, write_checkpoint};
 use crate::integrator::PathTracer;
+use crate::json_file;
 use crate::output::OutputError;
 use crate::sealed::SealedError;
+use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
 /// How far a frame is, as its files say.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Progress {
+pub enum FrameState {
     /// Units of a round are missing.
     Open {
         /// The round.
@@ -35,26 +37,26 @@ pub enum Progress {
 }
 
 /// How far a frame is. Reads names, not films.
-pub fn progress(farm: &Farm, frame_index: usize) -> Progress {
+pub fn progress(farm: &Farm, frame_index: usize) -> FrameState {
     if farm.result(frame_index).exists() {
-        return Progress::Done;
+        return FrameState::Done;
     }
     let Some(round) = open_round(farm, frame_index) else {
         // Rounds go when the result is there: it may have come between the two looks.
         let is_done = farm.result(frame_index).exists();
-        return if is_done { Progress::Done } else { Progress::ToMerge { round: None } };
+        return if is_done { FrameState::Done } else { FrameState::ToMerge { round: None } };
     };
     if round.round > 0 && !farm.film(frame_index).exists() {
         // The film is lost, and the frame begins anew: nobody needs this round's units.
-        return Progress::ToMerge { round: Some(round) };
+        return FrameState::ToMerge { round: Some(round) };
     }
     let is_missing = |unit: &u64| !farm.unit_file(*unit, "sums").exists();
     let missing: Vec<u64> = round.units.iter().map(|unit| unit.unit).filter(is_missing).collect();
     let can_be_rendered = |unit: &u64| farm.unit_file(*unit, "order").exists();
     if missing.iter().all(can_be_rendered) && !missing.is_empty() {
-        Progress::Open { round, missing }
+        FrameState::Open { round, missing }
     } else {
-        Progress::ToMerge { round: Some(round) }
+        FrameState::ToMerge { round: Some(round) }
     }
 }
 
@@ -158,12 +160,12 @@ pub fn finish(
     farm: &Farm,
     frame_index: usize,
     kept: Option<(&Header, &RenderState)>,
-    result: &[u8],
+    result: &impl Serialize,
 ) -> Result<(), OutputError> {
     if let Some((header, state)) = kept {
         write_checkpoint(&farm.finished_film(frame_index), header, state)?;
     }
-    crate::output::write_beside(&farm.result(frame_index), |file| std::io::Write::write_all(file, result))?;
+    json_file::write(&farm.result(frame_index), result)?;
     clear_before(farm, frame_index, u32::MAX);
     std::fs::remove_file(farm.film(frame_index)).ok();
     Ok(())

@@ -1,6 +1,7 @@
 //! What a farm renders.
 
 use crate::checkpoint::{Origin, PROGRAM};
+use crate::output::PictureFormat;
 use crate::scene::hash::ContentHash;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -41,26 +42,6 @@ pub enum Work {
     Render,
     /// `fechner animate`: frames of a shot.
     Animate,
-}
-
-/// A kind of picture file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PictureFormat {
-    /// Linear, with all layers.
-    Exr,
-    /// As the display shows it.
-    Png,
-}
-
-impl PictureFormat {
-    /// How its files' names end.
-    pub fn ending(self) -> &'static str {
-        match self {
-            Self::Exr => "exr",
-            Self::Png => "png",
-        }
-    }
 }
 
 /// One frame.

@@ -28,4 +28,4 @@ pub mod round;
 pub mod unit;
 
 pub use folder::{Farm, UnitPlace};
-pub use manifest::{FrameEntry, Manifest, ManifestError, PictureFormat, Work};
+pub use manifest::{FrameEntry, Manifest, ManifestError, Work};

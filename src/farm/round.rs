@@ -4,6 +4,7 @@ use super::folder::{Farm, UnitPlace};
 use super::unit::{NamedOrder, Order};
 use crate::adaptive::state::RenderState;
 use crate::integrator::BlockWork;
+use crate::json_file;
 use crate::output::{OutputError, write_beside};
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;
@@ -101,8 +102,7 @@ pub fn hand_out(farm: &Farm, frame_index: usize, state: &RenderState) -> Result<
         samples: units.iter().map(|unit| unit.samples).sum(),
         units,
     };
-    let text = serde_json::to_vec_pretty(&record).expect("string keys alone");
-    write_beside(&folder.join(RECORD), |to| to.write_all(&text))?;
+    json_file::write(&folder.join(RECORD), &record)?;
     Ok(record)
 }
 
@@ -129,8 +129,7 @@ fn last_record<T>(mut list: impl FnMut() -> Vec<u32>, read: impl Fn(u32) -> Opti
 }
 
 fn record(farm: &Farm, frame_index: usize, round: u32) -> Option<RoundRecord> {
-    let text = std::fs::read(farm.round_folder(frame_index, round).join(RECORD)).ok()?;
-    let record: RoundRecord = serde_json::from_slice(&text).ok()?;
+    let record: RoundRecord = json_file::read(&farm.round_folder(frame_index, round).join(RECORD))?;
     let is_own = |unit: &UnitRecord| {
         let place = farm.place(unit.unit);
         (place.round, place.frame_index) == (round, frame_index)

@@ -13,6 +13,7 @@ mod exr_file;
 mod exr_header;
 pub mod false_colour;
 mod frame_rate;
+mod picture_format;
 mod png_file;
 mod png_read;
 pub mod rendered;
@@ -24,6 +25,7 @@ pub use beside::{
 pub use exr_file::write_exr;
 pub use frame_rate::FRAMES_PER_SECOND;
 pub(crate) use frame_rate::fraction;
+pub use picture_format::PictureFormat;
 pub use png_file::{
     Shown, encode_srgb8, write_codes_png, write_png, write_png_for, write_png_with_alpha_for, write_pq_png,
     write_shown_png,
@@ -244,36 +246,13 @@ fn extension_problem(path: &Path) -> String {
     }
 }
 
-/// Formats that can be written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// 8-bit sRGB for a display.
-    Png,
-    /// Linear data, many channels.
-    Exr,
-}
-
-impl Format {
-    /// The format that a file's name asks for, by its ending, upper or lower case.
-    ///
-    /// # Errors
-    /// For any other ending.
-    pub fn of(path: &Path) -> Result<Self, OutputError> {
-        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("png") => Ok(Self::Png),
-            Some("exr") => Ok(Self::Exr),
-            _ => Err(OutputError::UnknownExtension { path: path.to_owned() }),
-        }
-    }
-}
-
 /// Tells whether `path` can be written, before the work is done: known ending, existing folder that lets files be made,
 /// and nothing but a file in its place. Leaves nothing behind.
 ///
 /// # Errors
 /// Says why not.
-pub fn check_target(path: &Path) -> Result<Format, OutputError> {
-    let format = Format::of(path)?;
+pub fn check_target(path: &Path) -> Result<PictureFormat, OutputError> {
+    let format = PictureFormat::of(path)?;
     beside::create_beside(path)?;
     Ok(format)
 }

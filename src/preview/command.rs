@@ -2,6 +2,7 @@
 
 use super::layer::Layer;
 use super::orbit::Movement;
+use crate::output::PictureFormat;
 use serde::{Deserialize, Serialize};
 
 /// What a viewer asks for.
@@ -36,7 +37,7 @@ pub(super) enum Command {
     /// Write the picture into the working folder.
     Save {
         /// As what.
-        format: SavedFormat,
+        format: PictureFormat,
     },
     /// Exposure correction in stops; none is the scene's.
     Exposure {
@@ -122,16 +123,6 @@ impl Command {
                 | Self::Inspect { .. }
         )
     }
-}
-
-/// Formats of saved pictures.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum SavedFormat {
-    /// As the display shows it.
-    Png,
-    /// With all layers.
-    Exr,
 }
 
 /// What the preview does.

@@ -34,11 +34,22 @@ pub(super) enum Layer {
     Velocity,
 }
 
-/// How many layers there are.
-pub(super) const LAYERS: usize = 10;
-
 impl Layer {
-    /// Place in arrays and in the first byte of a frame.
+    /// In the order of their declaration.
+    pub(super) const ALL: [Self; 10] = [
+        Self::Picture,
+        Self::Samples,
+        Self::Threshold,
+        Self::Visibility,
+        Self::Variance,
+        Self::HalfDifference,
+        Self::Albedo,
+        Self::Normal,
+        Self::Depth,
+        Self::Velocity,
+    ];
+
+    /// Place in [`Self::ALL`], in arrays of what layers have, and in the first byte of a frame.
     pub(super) fn index(self) -> usize {
         self as usize
     }
@@ -112,6 +123,12 @@ pub(super) fn nothing_yet(film: &Film) -> Colours {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn layers_stand_in_their_places() {
+        assert!(Layer::ALL.into_iter().enumerate().all(|(place, layer)| layer.index() == place));
+        assert_eq!(serde_json::from_str::<Layer>("\"velocity\"").expect("the last one").index(), Layer::ALL.len() - 1);
+    }
 
     /// Directions are told apart, and a still picture is one grey with a word about it.
     #[test]

@@ -15,6 +15,7 @@
 mod audience;
 mod coarse;
 mod command;
+mod composed;
 mod files;
 mod frame;
 mod glimpse;

@@ -1,6 +1,6 @@
 //! From film to encoded frames of the layers that somebody looks at.
 
-use super::coarse::stand_in;
+use super::composed::Composed;
 use super::frame::{Encoding, Frame};
 use super::layer::{self, Layer};
 use super::shared::Shared;
@@ -9,14 +9,11 @@ use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
 use crate::film::Film;
-use crate::integrator::PILOT_SAMPLES_A_HALF;
 use crate::output::encode_srgb8;
 use crate::output::false_colour::{self, Colours};
-use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::tone::{FittedTone, SavedTone, SceneLight, map_picture};
 use glam::Vec2;
-use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -37,7 +34,7 @@ pub struct Looked {
     /// Of the remaining noise.
     pub visibility: Plane,
     /// The picture, where it is denoised: linear RGB in cd/m².
-    pub denoised: Option<Vec<[f32; 3]>>,
+    pub denoised: Option<Arc<Vec<[f32; 3]>>>,
 }
 
 impl Looked {
@@ -46,7 +43,7 @@ impl Looked {
         Self {
             threshold: judgement.allowed_standard_error_cd_m2(),
             visibility: judgement.predicted.clone(),
-            denoised: judgement.denoised.as_ref().map(|denoised| denoised.rgb_cd_m2.clone()),
+            denoised: judgement.denoised.as_ref().map(|denoised| Arc::new(denoised.rgb_cd_m2.clone())),
         }
     }
 }
@@ -57,8 +54,7 @@ pub(super) struct Snapshot {
     /// Pixels of the picture to each of these, each way.
     pub(super) step: usize,
     pub(super) nits_per_unit: f64,
-    pub(super) rgb_cd_m2: Vec<[f32; 3]>,
-    pub(super) samples: Vec<u32>,
+    pub(super) composed: Composed,
     pub(super) looked: Option<Arc<Looked>>,
 }
 
@@ -186,19 +182,21 @@ impl Screen {
         let nits_per_unit = scenery.settings.nits_per_unit;
         // Denoised pictures are made by looks; between two the last one stays.
         let looked = self.looked.as_ref().or(self.looked_before.as_ref());
-        let denoised = looked.and_then(|looked| looked.denoised.clone());
-        let (raw, samples) = composed(scenery.film, nits_per_unit, scenery.stage);
-        let rgb_cd_m2 = denoised.unwrap_or(raw);
-        self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
+        let composed = match looked.and_then(|looked| looked.denoised.as_ref()) {
+            Some(rgb_cd_m2) => Composed::of_denoised(rgb_cd_m2, scenery.film),
+            None => Composed::of_film(scenery.film, nits_per_unit, scenery.stage),
+        };
+        let rgb_cd_m2 = composed.rgb_cd_m2.as_slice();
+        self.total_samples = composed.samples.iter().map(|&samples| u64::from(samples)).sum();
         let (width, height, stage) = (scenery.film.width(), scenery.film.height(), scenery.stage);
-        let watched = ALL.into_iter().filter(|&layer| shared.is_watched(layer));
+        let watched = Layer::ALL.into_iter().filter(|&layer| shared.is_watched(layer));
         let frames = watched
-            .map(|layer| Frame { layer, colours: self.colours(layer, scenery, &rgb_cd_m2), width, height, stage })
+            .map(|layer| Frame { layer, colours: self.colours(layer, scenery, rgb_cd_m2), width, height, stage })
             .collect();
         self.encoding.publish(frames, shared);
         let shown = Shown {
             film: scenery.film,
-            rgb_cd_m2: &rgb_cd_m2,
+            rgb_cd_m2,
             step: scenery.step,
             looked: self.looked.as_deref(),
             nits_per_unit,
@@ -209,8 +207,7 @@ impl Screen {
             width: scenery.film.width() as usize,
             step: scenery.step as usize,
             nits_per_unit,
-            rgb_cd_m2,
-            samples,
+            composed,
             looked: self.looked.clone(),
         });
     }
@@ -287,41 +284,6 @@ fn best_interval(since_start: Duration, cost: Duration) -> Duration {
     Duration::from_secs_f64((2.0 * cost.as_secs_f64() * since_start.as_secs_f64()).sqrt())
 }
 
-const ALL: [Layer; layer::LAYERS] = [
-    Layer::Picture,
-    Layer::Samples,
-    Layer::Threshold,
-    Layer::Visibility,
-    Layer::Variance,
-    Layer::HalfDifference,
-    Layer::Albedo,
-    Layer::Normal,
-    Layer::Depth,
-    Layer::Velocity,
-];
-
-/// The film's picture, cd/m², and its samples of each pixel; where it has none, another pixel's picture. In one walk: a film is
-/// many times as large as a picture.
-fn composed(film: &Film, nits_per_unit: f64, stage: Stage) -> (Vec<[f32; 3]>, Vec<u32>) {
-    // While a pixel's pilot is traced one half is ahead of the other, and their samples count alike.
-    let is_in_pilot =
-        |pixel: usize| Half::BOTH.iter().all(|&half| film.half(half)[pixel].taken <= PILOT_SAMPLES_A_HALF);
-    let light = |pixel: usize| {
-        let light = match stage {
-            Stage::UnderWay if is_in_pilot(pixel) => Film::mean_of_samples_cd_m2,
-            _ => Film::rgb_cd_m2,
-        };
-        light(film, pixel, nits_per_unit)
-    };
-    let of_pixel = |pixel: usize| match film.samples(pixel) {
-        0 => (stand_in(film, pixel).map_or([0.0; 3], light), 0),
-        samples => (light(pixel), samples),
-    };
-    let (mut rgb, mut samples) = (Vec::new(), Vec::new());
-    (0..film.pixel_count()).into_par_iter().map(of_pixel).unzip_into_vecs(&mut rgb, &mut samples);
-    (rgb, samples)
-}
-
 /// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's; a part is shown as its whole.
 fn fit(settings: &LoopSettings, step: u32, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Box<dyn FittedTone> {
     if let Some(whole) = settings.fitted.clone().filter(|_| step == 1) {
@@ -339,6 +301,7 @@ mod tests {
     use super::*;
     use crate::film::BlockSum;
     use crate::integrator::{BlockWork, PathSample, TraceSettings};
+    use crate::sampler::Half;
     use glam::Vec3;
 
     /// Adds a block of samples of one grey.
@@ -416,7 +379,7 @@ mod tests {
         [0, 1].into_iter().for_each(|pixel| add(&mut film, BlockWork::whole(pixel, Half::A, 0), 1.0));
         let settings = settings_with("constant");
         let plane = || Plane::from_fn(2, 1, |_, _| 1.0);
-        let looked = Looked { threshold: plane(), visibility: plane(), denoised: Some(vec![[7.0; 3]; 2]) };
+        let looked = Looked { threshold: plane(), visibility: plane(), denoised: Some(Arc::new(vec![[7.0; 3]; 2])) };
         let shared = Arc::new(Shared::new());
         let mut screen = Screen::new(Vec::new());
         screen.looked = Some(Arc::new(looked));
@@ -424,7 +387,7 @@ mod tests {
             let scenery = Scenery { film: &film, tone: None, settings: &settings, stage: Stage::AtRest, step: 1 };
             screen.publish(scenery, &shared);
             let snapshot = shared.snapshot().expect("something shown");
-            (snapshot.rgb_cd_m2[0], snapshot.looked.is_some())
+            (snapshot.composed.rgb_cd_m2[0], snapshot.looked.is_some())
         };
         assert_eq!(shown(&mut screen), ([7.0; 3], true));
         screen.forget_eyes();
@@ -432,20 +395,5 @@ mod tests {
         assert_eq!(shown(&mut screen), ([7.0; 3], false));
         screen.forget_look();
         assert_eq!(shown(&mut screen), ([100.0; 3], false));
-    }
-
-    /// In a pixel's pilot samples count alike, later and at rest halves do, whatever was looked at before.
-    #[test]
-    fn a_half_that_is_ahead_counts_for_its_samples_only_in_the_pilot() {
-        let mut film = Film::new(2, 1);
-        for pixel in [0, 1] {
-            add(&mut film, BlockWork::whole(pixel, Half::A, 0), 1.0);
-        }
-        add(&mut film, BlockWork { samples: 2, ..BlockWork::whole(0, Half::B, 0) }, 2.0);
-        add(&mut film, BlockWork::whole(1, Half::B, 0), 2.0);
-        add(&mut film, BlockWork::whole(1, Half::A, 1), 1.0);
-        let greys = |stage| composed(&film, 1.0, stage).0.iter().map(|rgb| rgb[0]).collect::<Vec<f32>>();
-        assert_eq!(greys(Stage::UnderWay), [1.2, 1.5]);
-        assert_eq!(greys(Stage::AtRest), [1.5, 1.5]);
     }
 }

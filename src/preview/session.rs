@@ -2,12 +2,14 @@
 
 mod depth;
 mod gaze;
+mod hand;
 mod live;
 mod motion;
 mod obeying;
 mod pace;
 mod problems;
 mod rest;
+mod rest_look;
 mod saving;
 mod telling;
 mod waiting;
@@ -16,7 +18,6 @@ mod watch;
 use super::coarse::order;
 use super::command::{Command, Phase};
 use super::glimpse::{Glimpse, Resolution};
-use super::orbit::Held;
 use super::screen::{Scenery, Screen};
 use super::shared::Shared;
 use super::spectator::Stage;
@@ -25,15 +26,16 @@ use crate::adaptive::glimpse::steady_glimpse_from;
 use crate::adaptive::judge::JudgeError;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
-use crate::adaptive::{LastLook, Progress, run as run_loop};
+use crate::adaptive::{Progress, run as run_loop};
 use crate::integrator::{Crop, PathTracer, TraceSettings};
 use fechner_perception::tone::SceneLight;
 use gaze::Follower;
+use hand::Hand;
 use live::{Live, settings_of};
 use motion::Neighbours;
 pub(super) use pace::Pace;
 use problems::{Cause, Problems};
-use rest::Unlooked;
+use rest_look::RestLook;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -63,9 +65,6 @@ pub(super) fn run(job: Job, host: &Arc<dyn Host>, mut options: Options, shared: 
     }
 }
 
-/// How long a camera must have rested for the whole picture to be begun: its film takes longer than a frame to make.
-const REST: Duration = Duration::from_millis(120);
-
 struct Session<'a> {
     host: &'a Arc<dyn Host>,
     shared: &'a Arc<Shared>,
@@ -73,11 +72,7 @@ struct Session<'a> {
     live: Live,
     /// Where the pointer stands for the gaze.
     gaze: Option<Follower>,
-    held: Held,
-    /// Whether the camera is another than the tracer's.
-    has_moved: bool,
-    /// When it was moved last, unless the picture is the first.
-    moved_at: Option<Instant>,
+    hand: Hand,
     resolution: Resolution,
     /// Until the film shows more.
     glimpse: Option<Glimpse>,
@@ -87,10 +82,7 @@ struct Session<'a> {
     settings: LoopSettings,
     phase: Phase,
     state: RenderState,
-    /// Of the picture that rests, once it was looked at.
-    last_look: Option<LastLook>,
-    /// While it rests and was not looked at as it is.
-    unlooked: Option<Unlooked>,
+    rest_look: RestLook,
     screen: Screen,
     /// The scenes a frame before and after, once somebody looks at motion.
     neighbours: Option<Neighbours>,
@@ -111,18 +103,14 @@ impl<'a> Session<'a> {
             host,
             shared,
             gaze: options.is_foveated.then(|| Follower::new(settings.viewing.display.pixel_density())),
-            held: Held::at_home(&job.scene.camera),
-            // The first picture begins as one after a movement does.
-            has_moved: true,
-            moved_at: None,
+            hand: Hand::at_home(&job.scene.camera),
             resolution: Resolution::new(),
             glimpse: None,
             tracer,
             whole_from_elsewhere: None,
             phase: Phase::Moving,
             state: RenderState::new(0, 0, &settings.limits),
-            last_look: None,
-            unlooked: None,
+            rest_look: RestLook::default(),
             screen: Screen::new(std::mem::take(&mut options.spectators)),
             neighbours: None,
             pace: Pace::new(),
@@ -143,18 +131,18 @@ impl<'a> Session<'a> {
             }
             self.obey_waiting();
             // Once for all movements that came: a glimpse for each would fall behind a hand that drags.
-            if std::mem::take(&mut self.has_moved) {
-                self.tracer.set_camera(&self.held.camera);
+            if self.hand.take_movement() {
+                self.tracer.set_camera(&self.hand.held.camera);
                 self.glimpse();
             }
             self.follow_gaze();
             match self.phase {
-                Phase::Moving => match self.moved_at.and_then(|moved_at| REST.checked_sub(moved_at.elapsed())) {
+                Phase::Moving => match self.hand.until_rest() {
                     Some(left) => self.shared.wait(left),
                     None => self.restart(),
                 },
                 Phase::Rendering => self.render(),
-                Phase::Paused | Phase::Stopped if self.unlooked.is_some() => self.look_at_rest(),
+                Phase::Paused | Phase::Stopped if self.rest_look.unlooked.is_some() => self.look_at_rest(),
                 Phase::Paused | Phase::Stopped => {
                     self.tell();
                     self.shared.wait(Duration::from_secs(1));
@@ -168,7 +156,7 @@ impl<'a> Session<'a> {
         let begun = Instant::now();
         let Crop { width, height, .. } = self.job.trace.film_area();
         self.phase = Phase::Moving;
-        self.forget_rest_look();
+        self.rest_look = RestLook::default();
         self.progress = None;
         self.screen.forget_look();
         // Films of another place are of no use, and counting their samples would take longer than the glimpse.
@@ -188,7 +176,7 @@ impl<'a> Session<'a> {
         self.state = RenderState::new(width, height, &self.settings.limits);
         self.order_pilot();
         self.phase = Phase::Rendering;
-        self.forget_rest_look();
+        self.rest_look = RestLook::default();
         self.progress = None;
         self.screen.begin();
         self.forget_motion();
@@ -197,11 +185,11 @@ impl<'a> Session<'a> {
     /// Fits tone to the whole as it is seen from here, as `render` would. From home the job knows it; if it does not, there is no whole, or
     /// it is too large to be looked at.
     fn fit_to_whole(&mut self) {
-        self.whole_from_elsewhere = self.job.whole.as_ref().filter(|_| !self.held.is_home).map(|_| {
+        self.whole_from_elsewhere = self.job.whole.as_ref().filter(|_| !self.hand.held.is_home).map(|_| {
             // Films of other seeds are shown alike.
             let trace = TraceSettings { seed: 0, ..self.job.trace };
             let nits_per_unit = self.settings.nits_per_unit;
-            let light = steady_glimpse_from(&self.held.camera, &mut self.tracer, &trace, nits_per_unit);
+            let light = steady_glimpse_from(&self.hand.held.camera, &mut self.tracer, &trace, nits_per_unit);
             SceneLight::stacked(&[&light], trace.width as usize, trace.height as usize)
         });
         // Not by the function below, which borrows the settings too.
@@ -263,7 +251,7 @@ impl<'a> Session<'a> {
                 self.state = RenderState::new(width, height, &self.settings.limits);
                 // What waits for this picture would wait for ever.
                 self.waiting.clear();
-                self.forget_rest_look();
+                self.rest_look = RestLook::default();
                 self.phase = Phase::Paused;
             }
         }

@@ -1,7 +1,7 @@
 //! What the render's thread and the viewers have in common. Nobody waits for a viewer: each slot holds the latest only.
 
 use super::command::Command;
-use super::layer::{LAYERS, Layer};
+use super::layer::Layer;
 use super::screen::Snapshot;
 use crate::poison::Unpoisoned as _;
 use axum::body::Bytes;
@@ -29,8 +29,8 @@ pub(super) struct Shared {
     /// Whether a command that waits throws the picture away.
     is_outdated: AtomicBool,
     /// Viewers of each layer.
-    viewers: [AtomicUsize; LAYERS],
-    frames: [watch::Sender<Encoded>; LAYERS],
+    viewers: [AtomicUsize; Layer::ALL.len()],
+    frames: [watch::Sender<Encoded>; Layer::ALL.len()],
     /// Frames that were given a number.
     numbered: AtomicU64,
     status: watch::Sender<Arc<str>>,

@@ -120,7 +120,7 @@ fn inspected(shared: &Shared, x: usize, y: usize) -> Option<String> {
     let snapshot = shared.snapshot()?;
     let (column, row) = (x / snapshot.step, y / snapshot.step);
     let pixel = row.checked_mul(snapshot.width)?.checked_add(column)?;
-    let rgb_cd_m2 = *snapshot.rgb_cd_m2.get(pixel).filter(|_| column < snapshot.width)?;
+    let rgb_cd_m2 = *snapshot.composed.rgb_cd_m2.get(pixel).filter(|_| column < snapshot.width)?;
     let looked = snapshot.looked.as_ref();
     serde_json::to_string(&Inspected {
         kind: "inspected",
@@ -128,7 +128,7 @@ fn inspected(shared: &Shared, x: usize, y: usize) -> Option<String> {
         y,
         rgb: rgb_cd_m2.map(|value| (f64::from(value) / snapshot.nits_per_unit) as f32),
         luminance_cd_m2: luminance(rgb_cd_m2),
-        samples: snapshot.samples[pixel],
+        samples: snapshot.composed.samples[pixel],
         threshold_cd_m2: looked.map(|looked| looked.threshold.values()[pixel]),
         visibility: looked.map(|looked| looked.visibility.values()[pixel]),
     })

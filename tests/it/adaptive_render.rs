@@ -1,14 +1,12 @@
 //! Adaptive and uniform renders of the Cornell box against a reference: energy, calibration, determinism.
 
-use crate::support::command;
-use crate::support::{loop_settings, trace_settings};
+use crate::support::{load_cornell_box, loop_settings, trace_settings};
 use fechner::adaptive::audit::audit;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::statistics::picture_variance;
 use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReason, render, run};
 use fechner::integrator::PathTracer;
-use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::model::{ModelInputs, ThresholdModel};
 use fechner_perception::{Error, Plane};
@@ -19,10 +17,6 @@ use std::time::Duration;
 /// What the scene file says.
 const NITS_PER_UNIT: f64 = 120.0;
 
-fn cornell_box() -> Scene {
-    load(&command::cornell_box(), &LoadOptions::default()).expect("the first scene loads")
-}
-
 fn render_cornell(
     size: u32,
     seed: u64,
@@ -30,7 +24,7 @@ fn render_cornell(
     visibility: impl Into<Option<f64>>,
     spp: Option<u32>,
 ) -> Rendered {
-    let scene = cornell_box();
+    let scene = load_cornell_box();
     let settings = loop_settings(scene.nits_per_unit, sampling, visibility, spp);
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(size, size, seed));
     render(&tracer, &settings, &Quiet).expect("the perception model takes the picture")
@@ -149,7 +143,7 @@ fn thread_count_changes_no_bit() {
 #[test]
 fn a_preview_is_a_prefix_of_the_final_picture() {
     let preview = render_cornell(40, 5, Sampling::Adaptive, 8.0, None);
-    let scene = cornell_box();
+    let scene = load_cornell_box();
     let mut settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 2.0, None);
     settings.limits.plans = Some(preview.plans);
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(40, 40, 5));
@@ -161,7 +155,7 @@ fn a_preview_is_a_prefix_of_the_final_picture() {
 /// same film: a preview's looks end when somebody wants another picture.
 #[test]
 fn looks_that_are_broken_off_change_nothing() {
-    let scene = Arc::new(cornell_box());
+    let scene = Arc::new(load_cornell_box());
     let settings = || loop_settings(scene.nits_per_unit, Sampling::Adaptive, 4.0, None);
     let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(208, 208, 5));
     let undisturbed = render(&tracer, &settings(), &Quiet).expect("renders");
@@ -254,7 +248,7 @@ fn limits_end_a_render() {
     let by_samples = render_cornell(24, 3, Sampling::Adaptive, 0.25, Some(40));
     assert_eq!(by_samples.stop_reason, fechner::adaptive::StopReason::Samples);
     assert!(by_samples.film.total_samples() <= 40 * 24 * 24);
-    let scene = cornell_box();
+    let scene = load_cornell_box();
     let mut settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 0.25, None);
     settings.limits.max_samples = 64;
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(24, 24, 5));
@@ -285,7 +279,7 @@ impl Monitor for Left {
 /// of a render that had ended. An odd limit is taken whole: adaptive sampling ended at 16.
 #[test]
 fn nothing_is_left_of_a_render_that_ends() {
-    let scene = Arc::new(cornell_box());
+    let scene = Arc::new(load_cornell_box());
     let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(16, 16, 1));
     for (sampling, visibility, max_samples, plans, most_left) in [
         (Sampling::Adaptive, Some(0.01), 17, None, 1.0),
@@ -343,7 +337,7 @@ impl Monitor for Failures {
 /// A look that fails, as by a denoiser, costs no sample: the state is told before it is dropped.
 #[test]
 fn a_look_that_fails_leaves_the_samples() {
-    let scene = Arc::new(cornell_box());
+    let scene = Arc::new(load_cornell_box());
     let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(16, 16, 1));
     let mut settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 1.0, None);
     settings.model = Some(Box::new(Blind));
@@ -385,7 +379,7 @@ impl Monitor for Leaver {
 #[test]
 fn every_look_is_in_the_seconds() {
     const ASLEEP: Duration = Duration::from_millis(20);
-    let scene = Arc::new(cornell_box());
+    let scene = Arc::new(load_cornell_box());
     let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(16, 16, 1));
     let renders: [(Sampling, &dyn Monitor); 2] =
         [(Sampling::Rival(RivalRule::Budget), &Quiet), (Sampling::Uniform, &Leaver)];
@@ -410,7 +404,7 @@ fn every_look_is_in_the_seconds() {
 /// The few samples that a cut leaves of a budget, since it ends within a block, are not looked for.
 #[test]
 fn remains_of_a_budget_take_no_look() {
-    let scene = Arc::new(cornell_box());
+    let scene = Arc::new(load_cornell_box());
     let ends = (1..=12).map(|seed| {
         let settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 1.0, Some(70));
         let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(23, 21, seed));
@@ -430,7 +424,7 @@ fn remains_of_a_budget_take_no_look() {
 /// spent evenly, to the last sample.
 #[test]
 fn a_budget_that_the_pilot_nearly_spends_takes_one_look() {
-    let scene = Arc::new(cornell_box());
+    let scene = Arc::new(load_cornell_box());
     // Of fewer pixels the lamp, which is seen from below, is thinner than one.
     let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(48, 48, 5));
     let looks_of = |spp: u32, visibility: f64, most: u32| {
@@ -458,7 +452,7 @@ fn a_budget_that_the_pilot_nearly_spends_takes_one_look() {
 /// Fresh samples agree with an honest variance, and disagree with one that is four times too low.
 #[test]
 fn an_audit_finds_variance_that_is_too_low() {
-    let scene = cornell_box();
+    let scene = load_cornell_box();
     let settings = loop_settings(scene.nits_per_unit, Sampling::Uniform, None, Some(32));
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(256, 192, 9));
     let mut rendered = render(&tracer, &settings, &Quiet).expect("renders");
@@ -482,7 +476,7 @@ fn an_audit_finds_variance_that_is_too_low() {
 #[test]
 fn the_smallest_pictures_are_rendered() {
     for [width, height] in [[1, 1], [2, 2], [1, 5], [3, 1]] {
-        let scene = cornell_box();
+        let scene = load_cornell_box();
         let settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 4.0, None);
         let tracer = PathTracer::new(Arc::new(scene), trace_settings(width, height, 1));
         let rendered = render(&tracer, &settings, &Quiet).expect("the perception model takes the picture");

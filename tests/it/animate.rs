@@ -1,6 +1,6 @@
 //! `fechner animate`: the same frames in any order and from any process, kept when they are there.
 
-use crate::support::command::fechner;
+use crate::support::command::{self, fechner, said};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -41,11 +41,8 @@ fn animate(folder: &Path, arguments: &[&str]) -> String {
 /// The same with another scene.
 fn animate_scene(folder: &Path, scene: &str, arguments: &[&str]) -> String {
     std::fs::write(folder.join("scene.toml"), scene).expect("written");
-    let output =
-        fechner().current_dir(folder).args(["animate", "scene.toml"]).args(arguments).output().expect("it starts");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
-    said
+    let output = command::run(fechner().current_dir(folder).args(["animate", "scene.toml"]).args(arguments));
+    said(&output)
 }
 
 /// Every picture and track in a folder. Records hold times, which differ.
@@ -575,7 +572,7 @@ fn a_budget_is_the_whole_shots() {
         "-o",
         "even/a.#.png",
     ]);
-    assert!(command.current_dir(at_once.path()).output().expect("starts").status.success());
+    command::run(command.current_dir(at_once.path()));
     let even = json("../even/a.json");
     assert!(even[0]["report"]["visibility_target"].is_null(), "{even}");
     assert_eq!(even[0]["report"]["stop_reason"], "time");

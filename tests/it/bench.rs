@@ -1,21 +1,22 @@
 //! The benchmark from end to end, as small as it gets.
 
-use crate::support::command::{cornell_box, fechner, repository_scene};
+use crate::support::command::{self, cornell_box, fechner, repository_scene, said};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
-fn bench(output: &Path, more: &[&str]) -> std::process::Output {
+fn bench(output: &Path, more: &[&str]) -> Command {
     let mut command = fechner();
     command.arg("bench").arg(cornell_box());
     command.args(["--size", "32", "--visibility", "12", "--reference-factor", "4", "-o"]);
-    command.arg(output).args(more).output().expect("runs")
+    command.arg(output).args(more);
+    command
 }
 
 #[test]
 fn results_are_complete_and_a_second_run_goes_on() {
     let folder = tempfile::tempdir().expect("a folder");
     let arms = ["--seeds", "2", "--arms", "relative,tvi,default,as-asked,uniform-equal-time,to-threshold,oracle"];
-    let first = bench(folder.path(), &arms);
-    assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
+    let first = command::run(&mut bench(folder.path(), &arms));
     let results = || -> serde_json::Value {
         serde_json::from_slice(&std::fs::read(folder.path().join("results.json")).expect("written")).expect("JSON")
     };
@@ -61,8 +62,7 @@ fn results_are_complete_and_a_second_run_goes_on() {
         files
     };
     let before = renders(folder.path());
-    let again = bench(folder.path(), &arms);
-    assert!(again.status.success());
+    command::run(&mut bench(folder.path(), &arms));
     assert_eq!(before, renders(folder.path()), "nothing is rendered twice");
     assert_eq!(found, results());
 }
@@ -73,12 +73,7 @@ fn damaged_files_are_made_anew() {
     let folder = tempfile::tempdir().expect("a folder");
     let output = folder.path();
     let arms = ["--seeds", "1", "--arms", "uniform"];
-    let run = || {
-        let run = bench(output, &arms);
-        let said = String::from_utf8_lossy(&run.stderr).into_owned();
-        assert!(run.status.success(), "{said}");
-        said
-    };
+    let run = || said(&command::run(&mut bench(output, &arms)));
     run();
     let found = |folder: &str, ending: &str| -> PathBuf {
         let mut entries = std::fs::read_dir(output.join(folder)).expect("a folder").flatten().map(|entry| entry.path());
@@ -117,8 +112,7 @@ fn scenes_of_one_name_are_told_apart() {
     let mut command = fechner();
     command.args(["bench", "light/box.toml", "dark/box.toml", "--size", "32", "--visibility", "12"]);
     command.args(["--reference-factor", "4", "--seeds", "1", "--arms", "uniform,tvi", "-o", "out"]);
-    let run = command.current_dir(folder.path()).output().expect("runs");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    command::run(command.current_dir(folder.path()));
     let results: serde_json::Value =
         serde_json::from_slice(&std::fs::read(folder.path().join("out/results.json")).expect("written")).expect("JSON");
     let records = results["records"].as_array().expect("records");
@@ -134,10 +128,10 @@ fn scenes_of_one_name_are_told_apart() {
 #[test]
 fn bounds_need_no_arms_and_unknown_arms_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let bound = bench(folder.path(), &["--bound"]);
+    let bound = command::run(&mut bench(folder.path(), &["--bound"]));
     let table = String::from_utf8_lossy(&bound.stdout).into_owned();
-    assert!(bound.status.success() && table.lines().count() == 5, "{table}");
-    let refused = bench(folder.path(), &["--arms", "magic"]);
+    assert_eq!(table.lines().count(), 5, "{table}");
+    let refused = bench(folder.path(), &["--arms", "magic"]).output().expect("runs");
     assert_eq!(refused.status.code(), Some(2));
     let told = String::from_utf8_lossy(&refused.stderr);
     assert!(told.contains("magic") && told.contains("no-masking"), "{told}");
@@ -147,7 +141,7 @@ fn bounds_need_no_arms_and_unknown_arms_are_refused() {
 #[test]
 fn no_rule_beats_the_bound() {
     let folder = tempfile::tempdir().expect("a folder");
-    let bound = bench(folder.path(), &["--bound"]);
+    let bound = command::run(&mut bench(folder.path(), &["--bound"]));
     let table = String::from_utf8_lossy(&bound.stdout).into_owned();
     for row in table.lines().skip(2) {
         let figure =
@@ -215,9 +209,9 @@ fn scenes_without_noise_or_light_have_tables() {
         let mut command = fechner();
         command.args(["bench", "flat.toml", "black.toml", "--size", "32", "--reference-factor", "0.25"]);
         command.args(["-o", "out"]).args(more).current_dir(folder.path());
-        let run = command.output().expect("runs");
+        let run = command::run(&mut command);
         let said = String::from_utf8_lossy(&[run.stdout, run.stderr].concat()).into_owned();
-        assert!(run.status.success() && !said.contains("NaN") && !said.contains("inf"), "{more:?}: {said}");
+        assert!(!said.contains("NaN") && !said.contains("inf"), "{more:?}: {said}");
         said
     };
     run(&["--arms", "uniform,relative,as-asked,oracle", "--seeds", "1"]);
@@ -253,8 +247,7 @@ fn names_of_scenes_are_quoted() {
         "--seeds",
         "1",
     ]);
-    let run = command.args(["--arms", "uniform", "-o", "out"]).current_dir(folder.path()).output().expect("runs");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    command::run(command.args(["--arms", "uniform", "-o", "out"]).current_dir(folder.path()));
     let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).expect("written");
     assert!(read("results.csv").lines().skip(1).all(|line| line.starts_with("\"a, <b> & 'c'\",uniform,")));
     let report = read("report.html");
@@ -266,8 +259,8 @@ fn names_of_scenes_are_quoted() {
 fn denoised_renders_are_not_made_twice() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = || {
-        let done = bench(folder.path(), &["--suite", "denoise", "--denoise", "builtin", "--law-only", "--seeds", "1"]);
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let arguments = ["--suite", "denoise", "--denoise", "builtin", "--law-only", "--seeds", "1"];
+        command::run(&mut bench(folder.path(), &arguments));
         std::fs::read_to_string(folder.path().join("denoise.json")).expect("written")
     };
     // Seconds are in it, which no two renders share.
@@ -280,8 +273,7 @@ fn the_suite_animation_writes_its_rows() {
     let scene = repository_scene("rolling-ball.toml");
     let mut command = fechner();
     command.arg("bench").arg(scene).args(["--suite", "animation", "--size", "32", "--fps", "24", "--visibility", "12"]);
-    let run = command.args(["--reference-factor", "1", "-o"]).arg(folder.path().join("out")).output().expect("runs");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    command::run(command.args(["--reference-factor", "1", "-o"]).arg(folder.path().join("out")));
     let text = std::fs::read(folder.path().join("out/animation.json")).expect("written");
     let results: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
     assert!(results[0]["denoiser"].is_null());
@@ -306,8 +298,8 @@ fn what_cannot_be_run_is_refused() {
         (&["--display", "wall"], "no display preset is called `wall`; there are: "),
         (&["--suite", "animation", "--display", "wall"], "no display preset is called `wall`; there are: "),
     ] {
-        let refused = bench(&folder.path().join("out"), arguments);
-        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        let refused = bench(&folder.path().join("out"), arguments).output().expect("runs");
+        let said = said(&refused);
         assert_eq!(refused.status.code(), Some(2), "{said}");
         assert!(said.contains(why) && said.trim().lines().count() == 1, "{said}");
         assert!(!folder.path().join("out").exists(), "{arguments:?}: something was written");

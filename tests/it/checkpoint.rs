@@ -1,7 +1,7 @@
 //! Renders that were stopped, killed, continued and merged, against renders in one go.
 
-use crate::support::command::{self, repository_scene};
-use crate::support::{loop_settings, trace_settings};
+use crate::support::command::repository_scene;
+use crate::support::{load_cornell_box, loop_settings, trace_settings};
 use fechner::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReason, render, resume, run};
@@ -13,7 +13,6 @@ use fechner::denoise::{Denoiser, DenoiserKind};
 use fechner::film::Film;
 use fechner::integrator::{PathTracer, SamplePlan};
 use fechner::sampler::Half;
-use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::csf::FrameTiming;
 use fechner_perception::eccentricity::Gaze;
@@ -23,10 +22,6 @@ use std::sync::{Arc, Mutex};
 
 const SIZE: u32 = 40;
 
-fn cornell_box() -> Scene {
-    load(&command::cornell_box(), &LoadOptions::default()).expect("the first scene loads")
-}
-
 struct Setup {
     tracer: PathTracer,
     header: Header,
@@ -34,7 +29,7 @@ struct Setup {
 
 impl Setup {
     fn new(seed: u64) -> Self {
-        let scene = cornell_box();
+        let scene = load_cornell_box();
         let settings = trace_settings(SIZE, SIZE, seed);
         let like = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 4.0, None);
         let header = Header {
@@ -410,7 +405,7 @@ fn what_a_look_decided_belongs_to_its_picture() {
         let settings = setup.settings(Sampling::Adaptive, 1.0);
         let limits = Limits { plans: Some(2), ..settings.limits };
         let settings = LoopSettings { denoiser: Some(Denoiser::Builtin), limits, ..settings };
-        let tracer = PathTracer::new(Arc::new(cornell_box()), trace_settings(size, size, 1));
+        let tracer = PathTracer::new(Arc::new(load_cornell_box()), trace_settings(size, size, 1));
         let state = RenderState::new(size, size, &settings.limits);
         run(&tracer, &settings, state, &Quiet).expect("renders").state
     };
@@ -502,15 +497,15 @@ fn foreign_files_and_versions_are_named() {
 #[test]
 fn films_of_another_origin_are_refused() {
     let own = Setup::new(1).header.origin;
-    let mut scene = cornell_box();
+    let mut scene = load_cornell_box();
     scene.camera.position.x += 1e-4;
     let others = [
         (Origin::of(&scene, &trace_settings(SIZE, SIZE, 1)), "another scene"),
-        (Origin::of(&cornell_box(), &trace_settings(SIZE, 41, 1)), "40x41"),
+        (Origin::of(&load_cornell_box(), &trace_settings(SIZE, 41, 1)), "40x41"),
         (Origin { program: "fechner 0.0.9".to_owned(), ..own.clone() }, "0.0.9"),
         (
             Origin::of(
-                &cornell_box(),
+                &load_cornell_box(),
                 &fechner::integrator::TraceSettings { clamp: Some(3.0), ..trace_settings(SIZE, SIZE, 1) },
             ),
             "with clamp 3.0, and these are with no clamp",
@@ -520,5 +515,5 @@ fn films_of_another_origin_are_refused() {
         let problem = other.difference(&own).expect("they differ");
         assert!(problem.contains(fragment), "{problem}");
     }
-    assert_eq!(Origin::of(&cornell_box(), &trace_settings(SIZE, SIZE, 2)).difference(&own), None);
+    assert_eq!(Origin::of(&load_cornell_box(), &trace_settings(SIZE, SIZE, 2)).difference(&own), None);
 }

@@ -2,6 +2,7 @@
 //! room's light.
 
 use crate::support::command;
+use crate::support::pictures::{mean, write_light};
 use fechner::exr_read::read_exr;
 use fechner::output::{Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, Picture, write_exr, write_png};
 use std::path::Path;
@@ -20,14 +21,9 @@ pub(crate) fn run(folder: &Path, arguments: &[&str]) -> String {
     said
 }
 
-/// A picture of light in cd/m², `rgb` of each pixel's number.
+/// A picture of light in cd/m², [`SIDE`] pixels wide and high, `rgb` of each pixel's number.
 pub(crate) fn write(folder: &Path, name: &str, rgb: impl Fn(usize) -> [f32; 3]) {
-    let mut picture = Picture::new(SIDE as u32, SIDE as u32);
-    for (channel, letter) in ["R", "G", "B"].into_iter().enumerate() {
-        picture.push_f32(letter, (0..SIDE * SIDE).map(|pixel| rgb(pixel)[channel]).collect::<Vec<_>>());
-    }
-    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
-    write_exr(&folder.join(name), &picture).expect("written");
+    write_light(&folder.join(name), [SIDE as u32; 2], rgb);
 }
 
 /// From -1 to 1, another number for each pixel and key.
@@ -37,12 +33,6 @@ pub(crate) fn random(pixel: usize, key: u64) -> f32 {
         hash = (hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     }
     (hash >> 40) as f32 / 8_388_608.0 - 1.0
-}
-
-pub(crate) fn mean(folder: &Path, name: &str, channel: &str) -> f32 {
-    let exr = read_exr(&folder.join(name)).expect("an EXR file");
-    let values = exr.channel(channel).expect("the channel");
-    values.iter().sum::<f32>() / values.len() as f32
 }
 
 pub(crate) fn visibility(said: &str) -> f32 {

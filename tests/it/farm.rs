@@ -47,8 +47,7 @@ pub(crate) fn plan(folder: &Path, name: &str, options: &[&str]) -> PathBuf {
 
 /// Numbers of the units that are missing.
 pub(crate) fn missing(folder: &Path) -> Vec<String> {
-    let output = fechner(folder, &["farm", "status", ".", "--list", "units"]).output().expect("runs");
-    assert!(output.status.success(), "{}", said(&output));
+    let output = command::run(&mut fechner(folder, &["farm", "status", ".", "--list", "units"]));
     String::from_utf8(output.stdout).expect("numbers").lines().map(str::to_owned).collect()
 }
 

@@ -1,22 +1,22 @@
 //! Samples go where a user's map sends them, and the film remembers by which map.
 
-use crate::support::command::{cornell_box, fechner};
+use crate::support::command::{self, cornell_box, fechner};
 use fechner::exr_read::{ExrImage, read_exr};
 use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr};
 use std::path::Path;
-use std::process::Output;
+use std::process::Command;
 
 const SIZE: usize = 48;
 
-fn run(folder: &Path, arguments: &[&str]) -> Output {
+fn render(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = fechner();
     command.arg("render").arg(cornell_box()).args(["--size", "48x48", "--visibility", "4", "--display", "strict"]);
-    command.args(arguments).current_dir(folder).output().expect("runs")
+    command.args(arguments).current_dir(folder);
+    command
 }
 
 fn rendered(folder: &Path, name: &str, arguments: &[&str]) -> ExrImage {
-    let output = run(folder, &[&["-o", name], arguments].concat());
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    command::run(&mut render(folder, &[&["-o", name], arguments].concat()));
     read_exr(&folder.join(name)).expect("readable")
 }
 
@@ -63,9 +63,9 @@ fn samples_go_where_the_map_sends_them() {
     map.push_f32("Y", vec![1.0; 64]);
     map.push_attribute(NITS_PER_UNIT, Attribute::Float(100.0));
     write_exr(&at.join("unit.exr"), &map).expect("written");
-    let output = run(at, &["-o", "with-unit.exr", "--importance", "unit.exr"]);
+    let output = command::run(&mut render(at, &["-o", "with-unit.exr", "--importance", "unit.exr"]));
     let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && !said.contains("unit.exr"), "{said}");
+    assert!(!said.contains("unit.exr"), "{said}");
     assert_eq!(read_exr(&at.join("with-unit.exr")).expect("readable").channels, plain.channels);
 }
 
@@ -77,17 +77,17 @@ fn a_film_remembers_its_map() {
     write_map(at, "left.exr", |x| if x < 4 { 0.5 } else { 2.0 });
     let film = ["--checkpoint", "a.film", "--plans", "1"];
     rendered(at, "a.exr", &[&film[..], &["--importance", "left.exr"]].concat());
-    let again = run(at, &[&["-o", "b.exr", "--resume", "--importance", "left.exr"], &film[..]].concat());
-    assert!(again.status.success());
+    let again = [&["-o", "b.exr", "--resume", "--importance", "left.exr"], &film[..]].concat();
+    let again = command::run(&mut render(at, &again));
     let told = String::from_utf8_lossy(&again.stderr).into_owned();
     assert!(!told.contains("other settings"), "{told}");
     let merge = ["merge", "a.film", "-o", "merged.png"];
     let merged = fechner().args(merge).current_dir(at).output();
     let told = String::from_utf8_lossy(&merged.expect("runs").stderr).into_owned();
     assert!(told.contains("note: sampled under an importance map"), "{told}");
-    let without = run(at, &[&["-o", "c.exr", "--resume"], &film[..]].concat());
+    let without = command::run(&mut render(at, &[&["-o", "c.exr", "--resume"], &film[..]].concat()));
     let told = String::from_utf8_lossy(&without.stderr).into_owned();
-    assert!(without.status.success() && told.contains("other settings"), "{told}");
+    assert!(told.contains("other settings"), "{told}");
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn maps_that_cannot_multiply_thresholds_are_refused() {
         (&["--importance", "wide.exr", "--sampling", "relative"], &["--sampling has none"]),
     ];
     for (arguments, fragments) in cases {
-        let output = run(at, &[&["-o", "a.png"], arguments].concat());
+        let output = render(at, &[&["-o", "a.png"], arguments].concat()).output().expect("runs");
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{message}");
         assert!(fragments.iter().all(|fragment| message.contains(fragment)), "{fragments:?} not in: {message}");

@@ -268,19 +268,18 @@ fn a_film_beside_the_ladder_is_told() {
 #[test]
 fn a_seed_is_entered_with_its_first_sample() {
     let folder = folder();
-    let run = |arguments: &[&str]| fechner(folder.path()).args(arguments).output().expect("runs");
+    let run = |arguments: &[&str]| command::run(fechner(folder.path()).args(arguments));
     let of = |seed: &str, spp: &str, film: &str, more: &[&str]| {
         let arguments =
             ["render", "s.toml", "--size", "16x16", "-o", "a.png", "--sampling", "uniform", "--json", "a.json"];
         let own = ["--seed", seed, "--spp", spp, "--checkpoint", film];
-        let output = run(&[&arguments[..], &own, more].concat());
-        assert!(output.status.success(), "{}", said(&output));
+        run(&[&arguments[..], &own, more].concat());
         let figures = std::fs::read(folder.path().join("a.json")).expect("written");
         serde_json::from_slice::<serde_json::Value>(&figures).expect("JSON")["seeds"].clone()
     };
     of("1", "16", "a.film", &[]);
     of("2", "16", "b.film", &[]);
-    assert!(run(&["merge", "a.film", "b.film", "-o", "sum.film"]).status.success());
+    run(&["merge", "a.film", "b.film", "-o", "sum.film"]);
     assert_eq!(of("9", "16", "sum.film", &["--resume"]), serde_json::json!([1, 2]));
     assert_eq!(of("7", "64", "sum.film", &["--resume"]), serde_json::json!([1, 2, 7]));
 }

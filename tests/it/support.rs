@@ -1,6 +1,7 @@
 //! Scenes made in code, and rendering them.
 
 pub(crate) mod command;
+pub(crate) mod pictures;
 
 use fechner::adaptive::settings::{Limits, LoopSettings, Sampling, THRESHOLD};
 use fechner::integrator::{PathTracer, TraceSettings};
@@ -26,6 +27,11 @@ pub(crate) fn empty_scene() -> Scene {
         film: FilmDefaults { width: 16, height: 16 },
         ..Scene::default()
     }
+}
+
+/// The Cornell box of `scenes/`.
+pub(crate) fn load_cornell_box() -> Scene {
+    load(&command::cornell_box(), &LoadOptions::default()).expect("the first scene loads")
 }
 
 /// Light of the same radiance from everywhere.

@@ -1,6 +1,6 @@
 //! `--texture-memory`: textures within a limit, and a note that says so.
 
-use crate::support::command::fechner;
+use crate::support::command::{self, fechner, said};
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Scene, Texels};
 use std::path::PathBuf;
@@ -55,7 +55,7 @@ fn textures_keep_to_the_limit() {
 #[test]
 fn render_takes_the_limit_in_megabytes() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |limit: &str| {
+    let render = |limit: &str| {
         let mut command = fechner();
         command.args([
             "render",
@@ -69,10 +69,10 @@ fn render_takes_the_limit_in_megabytes() {
             "a.png",
             "--texture-memory",
         ]);
-        command.arg(limit).arg(textured_room()).current_dir(folder.path()).output().expect("runs")
+        command.arg(limit).arg(textured_room()).current_dir(folder.path());
+        command
     };
-    let made = run("1");
-    let said = String::from_utf8_lossy(&made.stderr);
-    assert!(made.status.success() && said.contains("To keep textures within 1 MB"), "{said}");
-    assert_eq!(run("0").status.code(), Some(2));
+    let said = said(&command::run(&mut render("1")));
+    assert!(said.contains("To keep textures within 1 MB"), "{said}");
+    assert_eq!(render("0").output().expect("runs").status.code(), Some(2));
 }

@@ -1,36 +1,28 @@
 //! `fechner tonemap`: sheets, sequences in time, HDR displays, and what it refuses.
 
-use crate::support::command::fechner;
+use crate::support::command::{self, fechner};
+use crate::support::pictures::{mean, write_light};
 use fechner::exr_read::read_exr;
 use fechner::output::{
     Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, PartOf, Picture, png_pixel_aspect_ratio, write_exr,
 };
 use std::path::Path;
+use std::process::Command;
 
-fn tonemap(folder: &Path, arguments: &[&str]) -> std::process::Output {
-    fechner().arg("tonemap").args(arguments).current_dir(folder).output().expect("runs")
+fn tonemap(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = fechner();
+    command.arg("tonemap").args(arguments).current_dir(folder);
+    command
 }
 
 fn run(folder: &Path, arguments: &[&str]) -> String {
-    let output = tonemap(folder, arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    let output = command::run(&mut tonemap(folder, arguments));
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 /// A grey picture of 64×36 pixels, cd/m², with a step.
 fn write_step(folder: &Path, name: &str, dark: f32, bright: f32) {
-    let mut picture = Picture::new(64, 36);
-    for channel in ["R", "G", "B"] {
-        picture.push_f32(channel, (0..64 * 36).map(|i| if i % 64 < 32 { dark } else { bright }).collect::<Vec<_>>());
-    }
-    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
-    write_exr(&folder.join(name), &picture).expect("written");
-}
-
-fn mean_green(path: &Path) -> f32 {
-    let image = read_exr(path).expect("an EXR file");
-    let green = image.channel("G").expect("green");
-    green.iter().sum::<f32>() / green.len() as f32
+    write_light(&folder.join(name), [64, 36], |pixel| [if pixel % 64 < 32 { dark } else { bright }; 3]);
 }
 
 #[test]
@@ -114,7 +106,8 @@ fn light_that_covers_nothing_is_kept() {
     let green = exr.channel("G").expect("green");
     assert!((green[1] - 0.625).abs() < 2e-3, "{green:?}");
     assert_eq!(exr.channel("A"), Some(&[1.0, 0.0][..]));
-    let said = tonemap(folder.path(), &["a.exr", "-o", "shown.png", "--operator", "srgb"]).stderr;
+    let said =
+        tonemap(folder.path(), &["a.exr", "-o", "shown.png", "--operator", "srgb"]).output().expect("runs").stderr;
     let said = String::from_utf8_lossy(&said).into_owned();
     assert!(said.contains("light that covers nothing"), "{said}");
     let flame = image::open(folder.path().join("shown.png")).expect("a picture").into_rgba8().get_pixel(1, 0).0;
@@ -144,15 +137,12 @@ fn a_transparent_exr_is_shown_as_its_png() {
         let exr = read_exr(&folder.path().join("via.exr")).expect("an EXR file");
         let last = ["R", "G", "B"].map(|channel| exr.channel(channel).expect("a channel")[5]);
         assert_eq!(last, [0.0; 3], "{display}: light where nothing is");
-        let said = tonemap(folder.path(), &["via.exr", "-o", "via.png"]);
+        let said = command::run(&mut tonemap(folder.path(), &["via.exr", "-o", "via.png"]));
         assert!(said.stderr.is_empty(), "{}", String::from_utf8_lossy(&said.stderr));
         let [direct, via] = ["direct.png", "via.png"]
             .map(|name| image::open(folder.path().join(name)).expect("a picture").into_rgba8());
         assert_eq!(direct, via, "{display}");
-        let mut compare = fechner();
-        let said =
-            compare.args(["compare", "via.exr", "direct.png"]).current_dir(folder.path()).output().expect("runs");
-        assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stdout));
+        command::run(fechner().args(["compare", "via.exr", "direct.png"]).current_dir(folder.path()));
     }
 }
 
@@ -187,8 +177,7 @@ fn a_sequence_is_blinded_and_recovers_and_can_be_continued() {
     let common = ["--operator", "ptyg", "--fps", "5"];
     let whole = [&inputs[..], &common[..], &["-o", "whole.##.exr", "--adapted-to", "0.1"][..]].concat();
     run(folder.path(), &whole);
-    let course: Vec<f32> =
-        (1..=4).map(|frame| mean_green(&folder.path().join(format!("whole.{frame:02}.exr")))).collect();
+    let course: Vec<f32> = (1..=4).map(|frame| mean(folder.path(), &format!("whole.{frame:02}.exr"), "G")).collect();
     assert!(course[0] > 0.99 && course.windows(2).all(|pair| pair[1] < pair[0] + 1e-6), "{course:?}");
     assert!(course[3] < 0.8, "{course:?}");
 
@@ -198,8 +187,7 @@ fn a_sequence_is_blinded_and_recovers_and_can_be_continued() {
     }
     let by_shell = ["n10.exr", "n11.exr", "n8.exr", "n9.exr"];
     run(folder.path(), &[&by_shell[..], &common[..], &["-o", "shell.##.exr", "--adapted-to", "0.1"][..]].concat());
-    let again: Vec<f32> =
-        (8..=11).map(|frame| mean_green(&folder.path().join(format!("shell.{frame:02}.exr")))).collect();
+    let again: Vec<f32> = (8..=11).map(|frame| mean(folder.path(), &format!("shell.{frame:02}.exr"), "G")).collect();
     assert_eq!(again, course);
 
     // Frames that are missing take their time: two steps of a tenth of a second are one of a fifth.
@@ -208,7 +196,7 @@ fn a_sequence_is_blinded_and_recovers_and_can_be_continued() {
     }
     let gap = ["gap1.exr", "gap3.exr", "--operator", "ptyg", "--fps", "10", "-o", "gap.#.exr", "--adapted-to", "0.1"];
     run(folder.path(), &gap);
-    assert_eq!(mean_green(&folder.path().join("gap.3.exr")), course[1]);
+    assert_eq!(mean(folder.path(), "gap.3.exr", "G"), course[1]);
 
     // The same in two parts by way of a file.
     let start = r#"{"cones":{"neural_cd_m2":0.1,"pigment":1.0},"rods":{"neural_cd_m2":0.1,"pigment":0.3},
@@ -223,7 +211,7 @@ fn a_sequence_is_blinded_and_recovers_and_can_be_continued() {
     part(&inputs, "once.#.exr", "once.json");
     part(&inputs[..2], "twice.#.exr", "twice.json");
     part(&inputs[2..], "rest.#.exr", "twice.json");
-    let last = |name: &str| mean_green(&folder.path().join(name));
+    let last = |name: &str| mean(folder.path(), name, "G");
     // Frames keep the numbers of their inputs.
     assert_eq!(last("once.4.exr").to_bits(), last("rest.4.exr").to_bits());
 }
@@ -245,7 +233,7 @@ fn what_makes_no_sense_is_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
     write_step(folder.path(), "a.exr", 1.0, 1000.0);
     let refused = |arguments: &[&str], fragment: &str| {
-        let output = tonemap(folder.path(), arguments);
+        let output = tonemap(folder.path(), arguments).output().expect("runs");
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         assert!(message.contains(fragment) && !message.contains("panicked"), "{arguments:?}: {message}");

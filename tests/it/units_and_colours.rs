@@ -1,6 +1,7 @@
 //! `fechner compare` and `tonemap` heed what a picture's file says of its unit, its curve and its colours.
 
-use crate::displayed::{SIDE, fechner, mean, random, run, visibility, write};
+use crate::displayed::{SIDE, fechner, random, run, visibility, write};
+use crate::support::pictures::mean;
 use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr};
 use fechner_perception::display::Eotf;
 use fechner_perception::primaries::{Primaries, apply};

@@ -1,6 +1,6 @@
 //! The live preview as a browser meets it: over HTTP and a WebSocket.
 
-use crate::support::command::{cornell_box, fechner};
+use crate::support::command::{self, cornell_box, fechner};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -172,8 +172,7 @@ fn is_stopped(status: &Value) -> bool {
 fn rendered(folder: &Path, arguments: &[&str], name: &str) -> Vec<u8> {
     let mut command = fechner();
     command.arg("render").arg(cornell_box()).args(["--size", "32x32", "-o", name]).args(arguments).current_dir(folder);
-    let output = command.output().expect("runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    command::run(&mut command);
     std::fs::read(folder.join(name)).expect("written")
 }
 
@@ -262,7 +261,7 @@ fn a_part_is_as_bright_as_its_whole_from_another_camera() {
     std::fs::write(folder.path().join("moved.toml"), copied).expect("written");
     let mut command = fechner();
     command.args(["render", "moved.toml", "--size", "32x32", "-o", "moved.png"]).args(arguments);
-    assert!(command.current_dir(folder.path()).output().expect("runs").status.success());
+    command::run(command.current_dir(folder.path()));
     let [saved, rendered] = ["cornell-box-1.png", "moved.png"]
         .map(|name| brightness(&image::open(folder.path().join(name)).expect("a picture").into_rgb8()));
     assert!((saved / rendered - 1.0).abs() < 0.02, "{saved} is not {rendered}");
@@ -460,9 +459,8 @@ fn tev_changes_nothing() {
             "-o",
             name,
         ]);
-        let output = command.current_dir(at).output().expect("runs");
+        let output = command::run(command.current_dir(at));
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{said}");
         (said, std::fs::read(at.join(name)).expect("written"))
     };
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");

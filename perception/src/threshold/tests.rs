@@ -2,6 +2,7 @@ use super::*;
 use crate::csf::{CastleCsf, peak_sensitivity};
 use crate::display::Display;
 use crate::test_golden::check;
+use crate::test_noise::normal;
 
 fn viewing(pixels_per_degree: f64) -> Viewing {
     Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() }
@@ -272,10 +273,6 @@ fn bad_inputs_are_errors() {
     assert!(matches!(ask(&good, GuideNoise::White(&small), &Viewing::default()), Some(Error::SizeMismatch { .. })));
     assert!(matches!(ask(&good, GuideNoise::Clean, &viewing(0.0)), Some(Error::OutOfRange { .. })));
     assert!(matches!(ask(&good, GuideNoise::Clean, &viewing(f64::NAN)), Some(Error::OutOfRange { .. })));
-}
-
-fn normal(state: &mut u64) -> f32 {
-    crate::test_noise::normal(state)
 }
 
 /// Between −½ and ½, another value for every pixel.

@@ -1,6 +1,7 @@
 //! What is written beside a frame's picture: its figures, and by what a later run knows that it need not be made again.
 
 use anyhow::{Context, Result};
+use fechner::json_file;
 use fechner::read_file;
 use fechner::scene::hash::ContentHash;
 use serde::{Deserialize, Serialize};
@@ -28,13 +29,13 @@ impl FrameRecord {
 
     /// What is said of a picture by that name, if both files are there.
     pub(super) fn of_picture(picture: &Path) -> Option<Self> {
-        let record: Self = read_json(&Self::file(picture))?;
+        let record: Self = json_file::read(&Self::file(picture))?;
         (picture.is_file() && record.picture == name(picture)).then_some(record)
     }
 
     /// The picture that the record beside a picture that is there tells of instead: the same frame in another format.
     pub(super) fn of_another_picture(picture: &Path) -> Option<String> {
-        let record: Self = read_json(&Self::file(picture))?;
+        let record: Self = json_file::read(&Self::file(picture))?;
         (picture.is_file() && record.picture != name(picture)).then_some(record.picture)
     }
 
@@ -64,9 +65,4 @@ pub(super) fn name(file: &Path) -> String {
 pub(super) fn hash_of_file(file: &Path) -> Result<ContentHash> {
     let bytes = read_file::bytes(file).with_context(|| format!("{}", file.display()))?;
     Ok(ContentHash::of_bytes(&bytes))
-}
-
-/// What is in a file, or nothing if it is not there or not whole.
-pub(super) fn read_json<T: serde::de::DeserializeOwned>(file: &Path) -> Option<T> {
-    serde_json::from_slice(&read_file::bytes(file).ok()?).ok()
 }

@@ -12,7 +12,6 @@ use super::settings::shot_settings;
 use super::source::FileSource;
 use super::{AnimateArguments, AovNames, EyeChoice, VelocityChoice};
 use crate::cli::console::Console;
-use crate::cli::json::write_json;
 use crate::cli::report::Report;
 use crate::cli::seeing::Presentation;
 use crate::cli::targets::{Named, check_kept, check_scene_kept};
@@ -23,8 +22,9 @@ use fechner::animate::track::Track;
 use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
 use fechner::checkpoint::SettingsRecord;
 use fechner::denoise::Denoiser;
+use fechner::json_file;
 use fechner::output::rendered::{Background, layers, write_display_png};
-use fechner::output::{self, Attribute, Format};
+use fechner::output::{self, Attribute, PictureFormat};
 use fechner::scene::Scene;
 use fechner_perception::tone::{ToneOperator, ToneSettings, operator_named};
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// What a frame is made from and judged by.
-pub(in crate::cli) struct FrameJob {
+pub(in crate::cli) struct ShotFrame {
     pub(in crate::cli) scenes: FrameScenes,
     pub(in crate::cli) settings: LoopSettings,
     /// All that its file depends on, as a name.
@@ -47,7 +47,7 @@ pub(in crate::cli) struct Shot<'a> {
     operator_name: String,
     exposure_stops: Option<f64>,
     name: FrameName,
-    format: Format,
+    format: PictureFormat,
 }
 
 impl<'a> Shot<'a> {
@@ -63,12 +63,12 @@ impl<'a> Shot<'a> {
             bail!("--frames reaches beyond --shot");
         }
         let first_file = name.of(arguments.frames.first);
-        let format = Format::of(&first_file)?;
+        let format = PictureFormat::of(&first_file)?;
         let is_followed = matches!(arguments.eye, EyeChoice::Track | EyeChoice::Saliency);
-        if format == Format::Png && arguments.velocity_of == VelocityChoice::Image && !is_followed {
+        if format == PictureFormat::Png && arguments.velocity_of == VelocityChoice::Image && !is_followed {
             bail!("--velocity-of image: PNG frames hold no motion; name the frames .exr");
         }
-        if format == Format::Png && arguments.aov_names == AovNames::Blender {
+        if format == PictureFormat::Png && arguments.aov_names == AovNames::Blender {
             bail!("--aov-names blender: PNG frames hold no motion; name the frames .exr");
         }
         let source = FileSource::new(arguments);
@@ -223,7 +223,7 @@ impl<'a> Shot<'a> {
     }
 
     /// What a frame is made from and judged by.
-    pub(in crate::cli) fn frame(&self, frame: u32, track: &Track) -> Result<FrameJob> {
+    pub(in crate::cli) fn frame(&self, frame: u32, track: &Track) -> Result<ShotFrame> {
         self.frame_of_track(frame, track)?.with_context(|| {
             format!(
                 "frame {frame}: its scene has changed since {} was made: call again; a farm must be planned anew",
@@ -233,7 +233,7 @@ impl<'a> Shot<'a> {
     }
 
     /// The same; `None` where the track is not of the frame's scene.
-    fn frame_of_track(&self, frame: u32, track: &Track) -> Result<Option<FrameJob>> {
+    fn frame_of_track(&self, frame: u32, track: &Track) -> Result<Option<ShotFrame>> {
         let scenes = FrameScenes::load(&self.source, &self.settings, frame)?;
         let operator = self.operator()?;
         let Some(of_track) = track.of_frame(&self.settings, operator.as_ref(), frame, &scenes.now) else {
@@ -241,7 +241,7 @@ impl<'a> Shot<'a> {
         };
         let settings = self.settings.frame_settings(operator, of_track);
         let key = self.key(&settings, of_track, &scenes);
-        Ok(Some(FrameJob { scenes, settings, key }))
+        Ok(Some(ShotFrame { scenes, settings, key }))
     }
 
     /// The scene's name in reports.
@@ -255,7 +255,7 @@ impl<'a> Shot<'a> {
     }
 
     /// Writes a frame and its record.
-    pub(in crate::cli) fn keep(&self, frame: u32, job: &FrameJob, made: &RenderedFrame) -> Result<Report> {
+    pub(in crate::cli) fn keep(&self, frame: u32, job: &ShotFrame, made: &RenderedFrame) -> Result<Report> {
         let file = self.file(frame);
         let seed = self.settings.trace_settings(frame).seed;
         let report = Report::new(&self.scene_name(), &[seed], &job.settings, &made.rendered);
@@ -270,15 +270,17 @@ impl<'a> Shot<'a> {
             seconds_of_shot: self.settings.seconds(f64::from(frame)),
             report: serde_json::to_value(&report).context("the report could not be put into words")?,
         };
-        write_json(&FrameRecord::file(&file), &record)?;
+        json_file::write(&FrameRecord::file(&file), &record)?;
         say!("{}: {}", file.display(), report.in_a_line());
         Ok(report)
     }
 
     fn write(&self, file: &Path, made: &RenderedFrame, settings: &LoopSettings, report: &Report) -> Result<()> {
         match self.format {
-            Format::Png => write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?,
-            Format::Exr => {
+            PictureFormat::Png => {
+                write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?
+            }
+            PictureFormat::Exr => {
                 let attributes = report.attributes();
                 let mut picture = layers(&made.rendered, settings, Background::Shown, &attributes);
                 push_velocity(&mut picture, &made.velocity, self.arguments.aov_names);

@@ -73,7 +73,7 @@ fn part_of(needs: &[FrameNeed], frame: u32) -> f64 {
 
 /// How long frames have taken.
 #[derive(Debug)]
-pub(super) struct Progress {
+pub(super) struct FrameTimes {
     /// Of the frames to come: whether they have a record.
     to_come: VecDeque<bool>,
     rendered: u32,
@@ -82,7 +82,7 @@ pub(super) struct Progress {
     any_outdated: bool,
 }
 
-impl Progress {
+impl FrameTimes {
     /// For frames of which it is known whether they have a record. Those will be kept, unless one before was out of date: whether
     /// they are takes reading their scenes.
     pub(super) fn new(have_record: impl Iterator<Item = bool>) -> Self {
@@ -113,12 +113,12 @@ mod tests {
 
     #[test]
     fn frames_that_will_be_kept_take_no_time() {
-        let mut progress = Progress::new([true, false, true, true, false, true].into_iter());
-        progress.add(Made::Kept, Duration::from_secs(100));
-        progress.add(Made::New, Duration::from_secs(2));
-        assert_eq!(progress.seconds_left(), 2.0);
-        progress.add(Made::Anew, Duration::from_secs(4));
-        assert_eq!(progress.seconds_left(), 9.0);
+        let mut times = FrameTimes::new([true, false, true, true, false, true].into_iter());
+        times.add(Made::Kept, Duration::from_secs(100));
+        times.add(Made::New, Duration::from_secs(2));
+        assert_eq!(times.seconds_left(), 2.0);
+        times.add(Made::Anew, Duration::from_secs(4));
+        assert_eq!(times.seconds_left(), 9.0);
     }
 
     /// Of a shot of which every other frame is there, the others share all of the time.

@@ -125,29 +125,14 @@ pub(super) fn shown_rgb8(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fechner::adaptive::settings::{Limits, Sampling};
-    use fechner::animate::eye::Eye;
-    use fechner::animate::velocity::VelocityOf;
+    use fechner::adaptive::settings::Limits;
     use fechner::integrator::TraceSettings;
     use fechner_perception::display::Viewing;
 
     fn shot() -> ShotSettings {
-        ShotSettings {
-            first: 0,
-            last: 1,
-            frames_per_second: 24.0,
-            pausable: false,
-            trace: TraceSettings::new(4, 2, 0),
-            sampling: Sampling::Adaptive,
-            limits: Limits::of_visibility(1.0),
-            viewing: Viewing::default(),
-            nits_per_unit: 100.0,
-            adapted_to_cd_m2: None,
-            gaze: None,
-            denoiser: None,
-            eye: Eye::Rests,
-            velocity_of: VelocityOf::Surface,
-        }
+        let trace = TraceSettings::new(4, 2, 0);
+        let of_a_frame = ShotSettings::new(24.0, trace, Limits::of_visibility(1.0), Viewing::default(), 100.0);
+        ShotSettings { last: 1, ..of_a_frame }
     }
 
     #[test]

@@ -2,7 +2,6 @@
 
 use super::{CompareArguments, Figures, Seen, check_alike, write_map};
 use crate::cli::channels;
-use crate::cli::json::write_json;
 use crate::cli::kept_tone::{as_rendered, first_scene};
 use crate::cli::maps::check_map;
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
@@ -11,6 +10,7 @@ use crate::cli::words::{OF_THE_MODEL, count};
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::animate::spread_over;
+use fechner::json_file;
 use fechner::output;
 use fechner_perception::csf;
 use fechner_perception::display::Viewing;
@@ -314,7 +314,7 @@ impl<'a> Sequences<'a> {
             frames,
         };
         if let Some(path) = &self.arguments.json {
-            write_json(path, &figures)?;
+            json_file::write(path, &figures)?;
         }
         answer!(
             "{}: worst visibility {:.2} in frame {} (seen in a 1° patch with {:.1} %), {:.2} % of {} above threshold, \

@@ -1,6 +1,6 @@
 //! What a farm renders, from the arguments in its manifest: as `render` or `animate` understand them.
 
-use crate::cli::animate::{AnimateArguments, FrameJob as ShotFrame, Shot};
+use crate::cli::animate::{AnimateArguments, Shot, ShotFrame};
 use crate::cli::job::{JobArguments, Prepared};
 use crate::cli::keeper::fit_in;
 use crate::cli::render::write_picture;
@@ -13,9 +13,9 @@ use fechner::adaptive::settings::LoopSettings;
 use fechner::animate::RenderedFrame;
 use fechner::animate::track::Track;
 use fechner::checkpoint::{Header, Origin};
-use fechner::farm::{Farm, FrameEntry, PictureFormat, Work};
+use fechner::farm::{Farm, FrameEntry, Work};
 use fechner::integrator::{PathTracer, TraceSettings};
-use fechner::output;
+use fechner::output::{self, PictureFormat};
 use fechner::scene::Scene;
 use fechner::scene::hash::ContentHash;
 use std::cell::OnceCell;

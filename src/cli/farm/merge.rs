@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::adaptive::{Ended, Quiet, Rendered};
 use fechner::farm::Farm;
-use fechner::farm::frame::{FrameJob, Merged, Progress, finish, merge_frame, progress};
+use fechner::farm::frame::{FrameJob, FrameState, Merged, finish, merge_frame, progress};
 use fechner::farm::unit::Keeping;
 use fechner::lock::{Lock, try_lock, wait_for_lock};
 use fechner::output;
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<ExitCode> {
             if signals.leaves() {
                 return Ok(ExitCode::from(CALL_AGAIN));
             }
-            if let Progress::Open { missing, .. } = progress(farm, frame_index) {
+            if let FrameState::Open { missing, .. } = progress(farm, frame_index) {
                 say_missing(farm, frame_index, &missing);
                 waits = true;
                 continue;
@@ -87,7 +87,7 @@ fn say_missing(farm: &Farm, frame_index: usize, missing: &[u64]) {
 /// Merges a frame whose lock is held.
 pub(super) fn merge(worker: &Worker<'_>, frame_index: usize, lock: &Lock) -> Result<MergeWent> {
     let Worker { farm, job, signals, every, .. } = *worker;
-    if progress(farm, frame_index) == Progress::Done {
+    if progress(farm, frame_index) == FrameState::Done {
         return Ok(MergeWent::On);
     }
     let number = farm.frame(frame_index).frame;
@@ -128,8 +128,7 @@ pub(super) fn merge(worker: &Worker<'_>, frame_index: usize, lock: &Lock) -> Res
             let kept = farm.manifest().keeps_films.then(|| state.clone());
             let rendered = Rendered::new(state, look.judgement, look.stop_reason);
             let report = frame.write(farm, frame_index, rendered)?;
-            let text = serde_json::to_vec_pretty(&report).context("the report could not be put into words")?;
-            finish(farm, frame_index, kept.as_ref().map(|state| (frame.header(), state)), &text)?;
+            finish(farm, frame_index, kept.as_ref().map(|state| (frame.header(), state)), &report)?;
             Ok(MergeWent::On)
         }
     }
@@ -138,7 +137,7 @@ pub(super) fn merge(worker: &Worker<'_>, frame_index: usize, lock: &Lock) -> Res
 /// Makes what needs all frames, once, when all are done; where another process is at it, leaves it to that.
 pub(super) fn conclude(farm: &Farm, job: &Job<'_>) -> Result<()> {
     let indices = 0..farm.manifest().frames.len();
-    if !indices.clone().all(|frame_index| progress(farm, frame_index) == Progress::Done) {
+    if !indices.clone().all(|frame_index| progress(farm, frame_index) == FrameState::Done) {
         return Ok(());
     }
     for frame_index in indices {

@@ -4,11 +4,13 @@ use super::job::JobOptions;
 use crate::cli::numbers::whole;
 use crate::cli::words::{count, samples_in_words};
 use anyhow::{Context, Result, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use fechner::adaptive::settings::Limits;
 use fechner::adaptive::state::RenderState;
 use fechner::farm::round::hand_out;
-use fechner::farm::{Farm, FrameEntry, Manifest, PictureFormat, Work};
+use fechner::farm::{Farm, FrameEntry, Manifest, Work};
+use fechner::output::PictureFormat;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -31,8 +33,8 @@ pub(super) struct PlanArguments {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// What finished frames become: exr with all layers, or png as the display shows it.
-    #[arg(long, value_enum, default_value = "exr")]
-    format: Format,
+    #[arg(long, default_value = "exr", value_parser = picture_formats())]
+    format: PictureFormat,
     /// Keep the films of finished frames, for merge and for render --resume, which goes on with a frame of a shot as with a still.
     #[arg(long)]
     keep_films: bool,
@@ -41,10 +43,10 @@ pub(super) struct PlanArguments {
     options: Vec<String>,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Format {
-    Exr,
-    Png,
+/// By their files' endings, the usual one first.
+fn picture_formats() -> impl TypedValueParser<Value = PictureFormat> {
+    let endings = [PictureFormat::Exr, PictureFormat::Png].map(PictureFormat::ending);
+    PossibleValuesParser::new(endings).try_map(|ending| PictureFormat::of_ending(&ending).ok_or("no picture format"))
 }
 
 /// What a plan makes before its manifest: removed again where it fails, less what was there before.
@@ -112,13 +114,6 @@ impl PlanArguments {
             }
         }
     }
-
-    fn picture_format(&self) -> PictureFormat {
-        match self.format {
-            Format::Exr => PictureFormat::Exr,
-            Format::Png => PictureFormat::Png,
-        }
-    }
 }
 
 /// Plans; a folder that has a manifest is left alone.
@@ -127,7 +122,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
     check_is_free(folder)?;
     let directory = own_directory()?;
     let (work, words) = arguments.work();
-    let format = arguments.picture_format();
+    let format = arguments.format;
     JobOptions::parse(work, &words, folder, format).context("farm plan, after --")?;
     JobOptions::check_are_for_all(work, &words)?;
     let unfinished = Unfinished::make(&folder.join("pictures"))?;

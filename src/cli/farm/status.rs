@@ -5,7 +5,7 @@ use crate::cli::words::{count, samples_in_words};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use fechner::farm::Farm;
-use fechner::farm::frame::{Progress, progress};
+use fechner::farm::frame::{FrameState, progress};
 use fechner::lock::try_lock;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -89,9 +89,9 @@ pub(super) fn run(arguments: &StatusArguments) -> Result<ExitCode> {
 
 fn of_frame(farm: &Farm, frame_index: usize) -> FrameStatus {
     let (state, round, missing) = match progress(farm, frame_index) {
-        Progress::Done => (State::Done, None, Vec::new()),
-        Progress::ToMerge { round } => (State::Merge, round, Vec::new()),
-        Progress::Open { round, missing } => (State::Open, Some(round), missing),
+        FrameState::Done => (State::Done, None, Vec::new()),
+        FrameState::ToMerge { round } => (State::Merge, round, Vec::new()),
+        FrameState::Open { round, missing } => (State::Open, Some(round), missing),
     };
     let is_running = |unit: &&u64| {
         let lock = farm.unit_file(**unit, "lock");

@@ -9,10 +9,11 @@ use crate::cli::numbers::parse_seconds;
 use crate::cli::words::{count, listed, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use fechner::farm::frame::{Progress, progress};
+use fechner::farm::frame::{FrameState, progress};
 use fechner::farm::unit::{Keeping, NamedOrder, Outcome, UnitError, UnitSums, render_unit};
 use fechner::farm::{Farm, UnitPlace, frame};
 use fechner::integrator::PathTracer;
+use fechner::json_file;
 use fechner::lock::{Lock, try_lock, wait_for_lock};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -96,7 +97,7 @@ pub(super) fn run(arguments: &UnitArguments) -> Result<ExitCode> {
 
 /// Plans that a finished frame took, by its figures: rounds are numbered by the plans before them.
 fn plans_of_finished(farm: &Farm, frame_index: usize) -> Option<u32> {
-    let figures: serde_json::Value = serde_json::from_slice(&std::fs::read(farm.result(frame_index)).ok()?).ok()?;
+    let figures: serde_json::Value = json_file::read(&farm.result(frame_index))?;
     figures["plans"].as_u64()?.try_into().ok()
 }
 
@@ -163,9 +164,9 @@ impl<'a> Worker<'a> {
         let place = self.farm.place(unit);
         let number = self.farm.frame(place.frame_index).frame;
         let round = match progress(self.farm, place.frame_index) {
-            Progress::Done => return self.standing_when_done(place),
-            Progress::Open { round, .. } => Some(round),
-            Progress::ToMerge { round } => round,
+            FrameState::Done => return self.standing_when_done(place),
+            FrameState::Open { round, .. } => Some(round),
+            FrameState::ToMerge { round } => round,
         };
         let Some(round) = round else {
             return Standing::Unknown(format!("frame {number} has no round yet; fechner farm merge makes one"));
@@ -200,24 +201,39 @@ impl<'a> Worker<'a> {
                 return Ok(Went::HasNoOrder);
             }
         };
-        let sums = self.farm.unit_file(unit, "sums");
-        match UnitSums::read(&sums, &order) {
-            Ok(_) => {
-                say!("unit {unit}: is there");
-                return Ok(Went::WasThere);
-            }
+        if self.is_rendered(&order) {
+            say!("unit {unit}: is there");
+            return Ok(Went::WasThere);
+        }
+        let begun = self.begun(&order);
+        self.execute(&order, begun)
+    }
+
+    /// Whether a unit's result is there; one that is refused is put aside.
+    fn is_rendered(&self, order: &NamedOrder) -> bool {
+        let sums = self.farm.unit_file(order.order.unit, "sums");
+        match UnitSums::read(&sums, order) {
+            Ok(_) => return true,
             Err(error) if error.is_missing() => {}
             Err(error) => self.refuse(&sums, &error),
         }
-        let partial = self.farm.unit_file(unit, "partial");
-        let begun = match UnitSums::read_beginning(&partial, &order) {
-            Ok(begun) => Some(begun),
-            Err(error) if error.is_missing() => None,
-            Err(error) => {
-                self.refuse(&partial, &error);
-                None
-            }
-        };
+        false
+    }
+
+    /// The sums of a unit's checkpoint, if there is one; one that is refused is put aside.
+    fn begun(&self, order: &NamedOrder) -> Option<UnitSums> {
+        let partial = self.farm.unit_file(order.order.unit, "partial");
+        match UnitSums::read_beginning(&partial, order) {
+            Ok(begun) => return Some(begun),
+            Err(error) if error.is_missing() => {}
+            Err(error) => self.refuse(&partial, &error),
+        }
+        None
+    }
+
+    /// Traces what is not begun of an order.
+    fn execute(&mut self, order: &NamedOrder, begun: Option<UnitSums>) -> Result<Went> {
+        let unit = order.order.unit;
         let there = begun.as_ref().map_or(0, |begun| begun.sums.len());
         if there > 0 {
             say!("unit {unit}: goes on from its checkpoint, {there} of {}", count(order.order.blocks.len(), "block"));
@@ -227,7 +243,7 @@ impl<'a> Worker<'a> {
         let tracer = self.tracer(farm.place(unit).frame_index)?;
         let loaded = started.elapsed();
         let keeping = Keeping { every, wish: &|| signals.wish() };
-        match render_unit(farm, &order, begun, tracer, &keeping)? {
+        match render_unit(farm, order, begun, tracer, &keeping)? {
             Outcome::Left => {
                 say!("unit {unit}: left by a signal; its checkpoint is there");
                 Ok(Went::Left)

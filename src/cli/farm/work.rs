@@ -5,7 +5,7 @@ use super::unit::{IfBusy, KeepingArguments, Went, Worker};
 use super::{CALL_AGAIN, Threads, frame_lock};
 use anyhow::{Context, Result};
 use clap::Args;
-use fechner::farm::frame::{Progress, progress};
+use fechner::farm::frame::{FrameState, progress};
 use fechner::lock::try_lock;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -36,8 +36,8 @@ pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
                     return Ok(ExitCode::from(CALL_AGAIN));
                 }
                 match progress(farm, frame_index) {
-                    Progress::Done => continue,
-                    Progress::ToMerge { .. } => {
+                    FrameState::Done => continue,
+                    FrameState::ToMerge { .. } => {
                         let path = frame_lock(farm, frame_index)?;
                         if let Some(lock) = try_lock(&path).with_context(|| path.display().to_string())? {
                             match merge(&worker, frame_index, &lock)? {
@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
                             }
                         }
                     }
-                    Progress::Open { missing, .. } => {
+                    FrameState::Open { missing, .. } => {
                         for unit in missing {
                             match worker.render(unit, IfBusy::Skip)? {
                                 Went::Rendered => did_something = true,

@@ -4,20 +4,20 @@ use super::SceneFrame;
 use crate::cli::kept_tone::{LIGHT, OF_DISPLAY};
 use crate::cli::picture::note;
 use anyhow::{Context, Result};
-use fechner::output::{self, Attribute, Format, Picture, Shown, attribute, channel};
+use fechner::output::{self, Attribute, Picture, PictureFormat, Shown, attribute, channel};
 use fechner_perception::tone::{AdaptationState, FittedTone};
 use std::path::Path;
 
 pub(super) fn write(
     target: &Path,
-    format: Format,
+    format: PictureFormat,
     frame: &SceneFrame,
     fitted: &dyn FittedTone,
     state: Option<&AdaptationState>,
 ) -> Result<()> {
     match format {
-        Format::Png => write_png(target, frame, fitted),
-        Format::Exr => write_exr(target, frame, fitted, state),
+        PictureFormat::Png => write_png(target, frame, fitted),
+        PictureFormat::Exr => write_exr(target, frame, fitted, state),
     }
 }
 

@@ -15,15 +15,15 @@ impl Session<'_> {
     /// seen, else about as far as the scene's middle; and about the same as long as it moves. What is in focus says nothing: formats
     /// give pinholes a focus a million units away.
     pub(super) fn find_pivot(&mut self) {
-        let is_in_motion = self.phase == Phase::Moving && self.moved_at.is_some();
-        if is_in_motion && self.held.knows_pivot {
+        let is_in_motion = self.phase == Phase::Moving && self.hand.was_ever_moved();
+        if is_in_motion && self.hand.held.knows_pivot {
             return;
         }
         let Crop { width, height, .. } = self.job.trace.film_area();
         let in_middle = self.depth_at(width as usize / 2, height as usize / 2);
         let found = in_middle.or_else(|| self.median_depth()).or_else(|| self.depth_of_scene());
         if let Some(depth) = found {
-            (self.held.pivot_distance, self.held.knows_pivot) = (depth, true);
+            (self.hand.held.pivot_distance, self.hand.held.knows_pivot) = (depth, true);
         }
     }
 
@@ -58,14 +58,14 @@ impl Session<'_> {
     /// Films of what the camera sees, and pixels of the picture to each of theirs; none while the camera is another than theirs.
     fn films(&self) -> impl Iterator<Item = (&Film, usize)> {
         let glimpse = self.glimpse.as_ref().map(|glimpse| (&glimpse.film, glimpse.step as usize));
-        std::iter::once((&self.state.film, 1)).chain(glimpse).filter(|_| !self.has_moved)
+        std::iter::once((&self.state.film, 1)).chain(glimpse).filter(|_| !self.hand.has_moved())
     }
 
     /// Distance of the scene's middle, along the axis where that is before the camera; none from within it.
     fn depth_of_scene(&self) -> Option<f32> {
         let center = self.tracer.world().bounding_sphere().center;
-        let way = center - self.held.camera.position;
-        let along_axis = way.dot(self.held.camera.axes().forward);
+        let way = center - self.hand.held.camera.position;
+        let along_axis = way.dot(self.hand.held.camera.axes().forward);
         let distance = if along_axis > 0.0 { along_axis } else { way.length() };
         Some(distance).filter(|distance| distance.is_normal())
     }
@@ -74,7 +74,7 @@ impl Session<'_> {
     fn cosine_at(&self, x: usize, y: usize) -> f32 {
         let settings = self.tracer.settings();
         let (left, top) = (settings.film_area().x, settings.film_area().y);
-        let pinhole = Camera { aperture_radius: 0.0, motion: None, ..self.held.camera.clone() };
+        let pinhole = Camera { aperture_radius: 0.0, motion: None, ..self.hand.held.camera.clone() };
         let position_px = Vec2::new((left as usize + x) as f32 + 0.5, (top as usize + y) as f32 + 0.5);
         let sample = CameraSample { position_px, lens: [0.5; 2], time: 0.0 };
         let ray = CameraRays::new(&pinhole, settings.width, settings.height).ray(&sample);
@@ -85,9 +85,9 @@ impl Session<'_> {
         match self.depth_at(x, y) {
             None => self.note = Some("nothing to focus on there".to_owned()),
             Some(depth) => {
-                self.held.focus_at(depth);
-                if self.held.camera.aperture_radius > 0.0 {
-                    self.has_moved();
+                self.hand.held.focus_at(depth);
+                if self.hand.held.camera.aperture_radius > 0.0 {
+                    self.hand.moved();
                 } else {
                     self.note = Some("in focus, but the lens has no width: A widens it".to_owned());
                 }

@@ -49,10 +49,10 @@ impl Session<'_> {
             Some(Err(_)) => Motion::Unknown("the scenes a frame before and after cannot be read"),
             Some(Ok([before, after])) => {
                 // A camera in somebody's hand rests.
-                let cameras = if self.held.stands_like(&self.job.scene.camera) {
+                let cameras = if self.hand.held.stands_like(&self.job.scene.camera) {
                     [&before.camera, &self.job.scene.camera, &after.camera]
                 } else {
-                    [&self.held.camera; 3]
+                    [&self.hand.held.camera; 3]
                 };
                 let VelocityMap { to_next, .. } = VelocityMap::seen_by(cameras, &self.tracer, before, after);
                 Motion::Known { to_next_px: to_next, frames_per_second: USUAL_FRAMES_PER_SECOND }

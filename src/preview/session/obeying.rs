@@ -2,6 +2,7 @@
 
 use super::live::{Changed, Live, settings_of};
 use super::problems::Cause;
+use super::rest_look::RestLook;
 use super::{Session, interruptible};
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, StopReason};
@@ -10,7 +11,6 @@ use crate::preview::Job;
 use crate::preview::command::{Command, Phase};
 use crate::preview::orbit::Held;
 use std::sync::Arc;
-use std::time::Instant;
 
 impl Session<'_> {
     pub(super) fn obey(&mut self, command: Command) {
@@ -32,7 +32,7 @@ impl Session<'_> {
             Command::Resume if matches!(self.phase, Phase::Paused | Phase::Stopped) => self.go_on(),
             Command::Resume => self.forget_rest(),
             Command::Stop if self.phase != Phase::Stopped => {
-                if let Some(judgement) = self.last_look.take().map(|look| look.judgement).or_else(|| self.look()) {
+                if let Some(judgement) = self.rest_look.last.take().map(|look| look.judgement).or_else(|| self.look()) {
                     self.stopped(LastLook { judgement, stop_reason: StopReason::Interrupted });
                 }
             }
@@ -47,25 +47,20 @@ impl Session<'_> {
             Command::Camera { movement } => {
                 self.find_pivot();
                 let Crop { height, .. } = self.job.trace.film_area();
-                self.held.moved(movement.in_part(height as f32 / self.job.trace.height as f32));
-                self.has_moved();
+                self.hand.held.moved(movement.in_part(height as f32 / self.job.trace.height as f32));
+                self.hand.moved();
             }
             Command::Focus { x, y } => self.focus_on(x, y),
             Command::CameraHome => {
-                self.held = Held::at_home(&self.job.scene.camera);
-                self.has_moved();
+                self.hand.held = Held::at_home(&self.job.scene.camera);
+                self.hand.moved();
             }
             Command::Reload => self.reload(),
         }
     }
 
-    pub(super) fn has_moved(&mut self) {
-        self.has_moved = true;
-        self.moved_at = Some(Instant::now());
-    }
-
     pub(super) fn go_on(&mut self) {
-        self.forget_rest_look();
+        self.rest_look = RestLook::default();
         self.phase = Phase::Rendering;
     }
 
@@ -76,7 +71,7 @@ impl Session<'_> {
             return;
         };
         let gaze = follower.follow(self.shared, self.settings.viewing.display.pixel_density());
-        let rests_by_itself = matches!(self.reason_of_rest(), Some(StopReason::Visibility | StopReason::MaxSamples));
+        let rests_by_itself = matches!(self.rest_look.reason(), Some(StopReason::Visibility | StopReason::MaxSamples));
         self.change(|live| live.gaze = gaze, Changed::Gaze);
         // Whom a viewer or a limit stopped, no pointer wakes.
         if self.phase == Phase::Stopped && rests_by_itself {
@@ -139,11 +134,11 @@ impl Session<'_> {
             Ok((job, settings)) => {
                 self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
                 // Who edits a lamp wants to see it from where he was; who edits the camera, from there.
-                let is_kept = !self.held.is_home && job.scene.camera == self.job.scene.camera;
+                let is_kept = !self.hand.held.is_home && job.scene.camera == self.job.scene.camera;
                 if is_kept {
-                    self.tracer.set_camera(&self.held.camera);
+                    self.tracer.set_camera(&self.hand.held.camera);
                 } else {
-                    self.held = Held::at_home(&job.scene.camera);
+                    self.hand.held = Held::at_home(&job.scene.camera);
                 }
                 (self.job, self.settings) = (job, interruptible(settings, self.shared));
                 self.neighbours = None;

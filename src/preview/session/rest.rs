@@ -6,6 +6,7 @@
 use super::Session;
 use super::live::Changed;
 use super::problems::Cause;
+use super::rest_look::{RestLook, Unlooked};
 use super::waiting::is_whole;
 use crate::adaptive::judge::{JudgeError, Judgement, judge};
 use crate::adaptive::{LastLook, StopReason, is_reached};
@@ -13,22 +14,13 @@ use crate::preview::command::Phase;
 use crate::preview::screen::Looked;
 use std::sync::Arc;
 
-/// A rest that lacks a look.
-#[derive(Clone, Copy)]
-pub(super) struct Unlooked {
-    /// Why the picture rested before.
-    before: StopReason,
-    /// What has changed since.
-    changed: Changed,
-}
-
 impl Session<'_> {
     pub(super) fn pause(&mut self) {
         self.phase = Phase::Paused;
-        self.forget_rest_look();
+        self.rest_look = RestLook::default();
         if is_whole(&self.state) {
             self.glimpse = None;
-            self.unlooked = Some(Unlooked { before: StopReason::Interrupted, changed: Changed::Seen });
+            self.rest_look = RestLook::wanted(Unlooked { before: StopReason::Interrupted, changed: Changed::Seen });
         }
         self.show();
         self.tell();
@@ -49,22 +41,9 @@ impl Session<'_> {
         self.problems.solve(Cause::Look);
         self.screen.looked = Some(Arc::new(Looked::of(&last_look.judgement)));
         self.state.tone = Some(last_look.judgement.tone.save());
-        self.last_look = Some(last_look);
-        self.unlooked = None;
+        self.rest_look = RestLook::of(last_look);
         self.show();
         self.tell();
-    }
-
-    /// Why the picture rests, or did before something changed; `None` where nobody has looked.
-    pub(super) fn reason_of_rest(&self) -> Option<StopReason> {
-        let before = self.unlooked.map(|unlooked| unlooked.before);
-        before.or_else(|| self.last_look.as_ref().map(|look| look.stop_reason))
-    }
-
-    /// What was seen of a rest that is over.
-    pub(super) fn forget_rest_look(&mut self) {
-        self.last_look = None;
-        self.unlooked = None;
     }
 
     /// What was seen of the picture at rest holds no more. A pause has no target.
@@ -75,10 +54,7 @@ impl Session<'_> {
             Phase::Moving | Phase::Rendering => false,
         };
         if is_concerned {
-            let before = self.reason_of_rest().unwrap_or(StopReason::Interrupted);
-            let changed = self.unlooked.map_or(changed, |earlier| earlier.changed.and(changed));
-            self.last_look = None;
-            self.unlooked = Some(Unlooked { before, changed });
+            self.rest_look.ask_again(changed);
         }
     }
 
@@ -93,7 +69,7 @@ impl Session<'_> {
             Err(JudgeError::Outdated) => {}
             Err(error) => {
                 self.problems.meet(Cause::Look, error.to_string());
-                self.unlooked = None;
+                self.rest_look.unlooked = None;
             }
         }
     }
@@ -113,7 +89,7 @@ impl Session<'_> {
     /// it, goes on where another target asks for more. For other eyes it stays as it is, and says no longer why it rests.
     pub(super) fn reason_to_rest(&self, judgement: &Judgement) -> Option<StopReason> {
         use StopReason::{Interrupted, MaxSamples, Visibility};
-        let Some(Unlooked { before, changed }) = self.unlooked else { return Some(Interrupted) };
+        let Some(Unlooked { before, changed }) = self.rest_look.unlooked else { return Some(Interrupted) };
         let is_reached = is_reached(judgement, self.settings.limits.last_rung());
         match (before, changed) {
             // Somebody stopped it, or a pause is no end.

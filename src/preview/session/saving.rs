@@ -3,18 +3,20 @@
 use super::Session;
 use super::problems::Cause;
 use crate::adaptive::{LastLook, Rendered, StopReason};
-use crate::preview::command::{Phase, SavedFormat};
+use crate::output::PictureFormat;
+use crate::preview::command::Phase;
 use std::path::PathBuf;
 
 impl Session<'_> {
     /// Writes the picture so far under a name that is free.
-    pub(super) fn save(&mut self, format: SavedFormat) {
+    pub(super) fn save(&mut self, format: PictureFormat) {
         if self.state.film.total_samples() == 0 {
             self.problems.meet(Cause::Save, "not saved: the picture has no samples yet".to_owned());
             return;
         }
-        let was_looked_at = self.last_look.is_some();
-        let Some(LastLook { judgement, stop_reason }) = self.last_look.take().or_else(|| self.look_to_save()) else {
+        let was_looked_at = self.rest_look.last.is_some();
+        let Some(LastLook { judgement, stop_reason }) = self.rest_look.last.take().or_else(|| self.look_to_save())
+        else {
             self.problems.meet(Cause::Save, "not saved: the picture cannot be looked at".to_owned());
             return;
         };
@@ -29,7 +31,7 @@ impl Session<'_> {
         }
         let Rendered { judgement, stop_reason, .. } = rendered;
         if was_looked_at {
-            self.last_look = Some(LastLook { judgement, stop_reason });
+            self.rest_look.last = Some(LastLook { judgement, stop_reason });
         } else if matches!(self.phase, Phase::Paused | Phase::Stopped) {
             self.looked_at_rest(judgement);
         }
@@ -46,12 +48,9 @@ impl Session<'_> {
     }
 
     /// The scene file's name and the first free number, in the working folder.
-    fn free_name(&self, format: SavedFormat) -> PathBuf {
+    fn free_name(&self, format: PictureFormat) -> PathBuf {
         let stem = self.host.scene_file().file_stem().map_or_else(|| "view".into(), |stem| stem.to_string_lossy());
-        let ending = match format {
-            SavedFormat::Png => "png",
-            SavedFormat::Exr => "exr",
-        };
+        let ending = format.ending();
         let name = |number: u32| PathBuf::from(format!("{stem}-{number}.{ending}"));
         // A link that leads nowhere is somebody's name, too.
         (1..).map(name).find(|path| path.symlink_metadata().is_err()).unwrap_or_else(|| name(0))

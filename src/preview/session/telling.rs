@@ -24,7 +24,7 @@ impl Session<'_> {
         let operator = self.live.operator.as_ref().unwrap_or(&self.job.record.operator);
         let mut status = Status {
             phase: self.phase,
-            reason: self.last_look.as_ref().filter(|_| self.phase == Phase::Stopped).map(|look| {
+            reason: self.rest_look.last.as_ref().filter(|_| self.phase == Phase::Stopped).map(|look| {
                 match look.stop_reason {
                     StopReason::Visibility if !self.settings.gazes.is_empty() => "nothing more can be seen from there",
                     reason => in_words(reason),
@@ -38,11 +38,11 @@ impl Session<'_> {
             error: self.problems.told(),
             note: self.note.clone(),
             is_foveated: self.gaze.is_some(),
-            ..blank_status(&self.job.scene, &self.settings, operator, &self.held)
+            ..blank_status(&self.job.scene, &self.settings, operator, &self.hand.held)
         };
         count(&mut status, state, self.screen.total_samples, self.progress.as_ref());
         // What was seen at rest is later than what the loop saw.
-        if let Some(look) = self.last_look.as_ref().filter(|look| look.judgement.is_known) {
+        if let Some(look) = self.rest_look.last.as_ref().filter(|look| look.judgement.is_known) {
             let aimed_at = self.settings.limits.visibility_or_threshold();
             status.visible_share = Some(visible_share(&look.judgement, aimed_at));
         }

@@ -10,7 +10,7 @@ impl Session<'_> {
     /// Whether it would be done to a picture before the one that it is meant for, or to one that is not whole. What has stopped is
     /// as whole as its limits let it be.
     pub(super) fn must_wait(&self, command: &Command) -> bool {
-        let is_in_motion = self.has_moved || self.phase == Phase::Moving;
+        let is_in_motion = self.hand.has_moved() || self.phase == Phase::Moving;
         let is_whole = || self.phase == Phase::Stopped || is_whole(&self.state);
         match command {
             // A pause must not overtake what waits for samples.
@@ -23,7 +23,7 @@ impl Session<'_> {
     /// Keeps a command until it can be done. A pause in the first pass ends for what needs all of that pass, and comes back after a file.
     pub(super) fn let_wait(&mut self, command: Command) {
         let is_file = matches!(command, Command::Save { .. });
-        let breaks_a_pause = self.phase == Phase::Paused && !self.has_moved;
+        let breaks_a_pause = self.phase == Phase::Paused && !self.hand.has_moved();
         self.waiting.push(command);
         if breaks_a_pause {
             self.waiting.extend(is_file.then_some(Command::Pause));
@@ -40,7 +40,7 @@ impl Session<'_> {
             // Nothing more comes by itself.
             Phase::Paused | Phase::Stopped => true,
         };
-        if is_ready && !self.has_moved {
+        if is_ready && !self.hand.has_moved() {
             for command in std::mem::take(&mut self.waiting) {
                 self.obey(command);
             }

@@ -4,10 +4,10 @@ use super::Shot;
 use crate::cli::animate::contact::{ContactSheet, on_sheet};
 use crate::cli::animate::record::FrameRecord;
 use crate::cli::animate::video::{self, shown_rgb8};
-use crate::cli::json::write_json;
 use crate::cli::words::listed;
 use anyhow::Result;
 use fechner::animate::track::Track;
+use fechner::json_file;
 use fechner::output;
 use std::path::PathBuf;
 
@@ -32,7 +32,7 @@ impl Shot<'_> {
         for (_, file) in self.files_of_whole()? {
             output::remove_leftovers(&file);
         }
-        write_json(&self.name.of_shot("json"), &records)?;
+        json_file::write(&self.name.of_shot("json"), &records)?;
         let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
         let count = records.len();
         let size = (self.settings.trace.width as usize, self.settings.trace.height as usize);

@@ -1,7 +1,6 @@
 //! What is known of all frames of a shot before any is rendered: their light, and what each needs.
 
 use super::{Shot, named_folder};
-use crate::cli::animate::record::read_json;
 use crate::cli::console::{Counter, duration_in_words};
 use crate::cli::words::count;
 use anyhow::{Context as _, Result};
@@ -9,9 +8,9 @@ use fechner::adaptive::settings::Sampling;
 use fechner::animate::SceneSource as _;
 use fechner::animate::budget::Needs;
 use fechner::animate::track::Track;
+use fechner::json_file;
 use fechner::output;
 use fechner_perception::tone::ToneOperator;
-use std::io::Write as _;
 use std::ops::RangeInclusive;
 use std::path::Path;
 use std::time::Instant;
@@ -22,7 +21,7 @@ impl Shot<'_> {
     pub(in crate::cli) fn track(&self, wanted: RangeInclusive<u32>) -> Result<Track> {
         let file = self.track_file();
         let operator = self.operator()?;
-        if let Some(track) = read_json::<Track>(&file) {
+        if let Some(track) = json_file::read::<Track>(&file) {
             if self.is_up_to_date(&track, operator.as_ref(), wanted)? {
                 self.make_folder()?;
                 return Ok(track);
@@ -43,9 +42,8 @@ impl Shot<'_> {
         self.make_folder()?;
         let seconds = started.elapsed().as_secs_f64();
         say!("found the light of {} in {}", count(frames, "frame"), duration_in_words(seconds));
-        let text = serde_json::to_string(&track).context("the track could not be put into words")?;
         output::remove_leftovers(&file);
-        output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
+        json_file::write_in_a_line(&file, &track)?;
         Ok(track)
     }
 
