@@ -7,7 +7,7 @@ mod shown;
 
 use crate::csf::ChromaticChannel;
 use crate::display::Display;
-use crate::opponent::{OPPONENT_OF_RGB, Opponent, opponent};
+use crate::opponent::{OPPONENT_OF_RGB, Opponent};
 use crate::photometry::REC709_WEIGHTS;
 use crate::plane::{PIXELS_A_TASK, Plane};
 use crate::tone::{FittedTone, Pixel};
@@ -74,10 +74,20 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
     })
 }
 
+/// A picture's colours, on which noise is.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneColours<'a> {
+    /// Linear Rec. 709 RGB of any strength, row-major: noise of luminance makes it brighter and darker.
+    pub rgb: &'a [[f32; 3]],
+    /// What the operator leaves of a faint tint on a grey: [`display_chromatic_slope`].
+    pub chromatic_slope: &'a Plane,
+}
+
 /// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², for those of the scene, `scene` ((cd/m²)², of the
-/// mean), on scene luminance `mean` (cd/m²): of luminance as [`display_variance`]; of colour by what the operator leaves of a faint
-/// tint on a grey, `chromatic_slope` ([`display_chromatic_slope`]), and by the room for tints below the display's white, where every
-/// colour becomes white ([`crate::tone::fit_into_display`]). Nothing is taken off at black, whose tints are small by themselves.
+/// mean), on scene luminance `mean` (cd/m²): of luminance as [`display_variance`]; of colour the greater of two. One is what the operator
+/// leaves of tints, as far as there is room for them below the display's white, where every colour becomes white
+/// ([`crate::tone::fit_into_display`]); nothing is taken off at black, whose tints are small by themselves. The other is what becomes of
+/// `colours` that fit the display less, the brighter they are: red at half of white's luminance pales with each step towards it.
 ///
 /// Pixels that are not finite, or of negative variance, get infinity; of colour also where luminance's variance is so. So does every
 /// pixel when the planes differ in size.
@@ -86,11 +96,12 @@ pub fn display_opponent_variances(
     fitted: &dyn FittedTone,
     display: &Display,
     mean: &Plane,
-    chromatic_slope: &Plane,
+    colours: SceneColours<'_>,
     scene: [&Plane; 3],
 ) -> [Plane; 3] {
     let (width, height) = (mean.width(), mean.height());
-    if !scene.iter().chain([&chromatic_slope]).all(|plane| plane.same_size(mean)) {
+    let are_alike = scene.iter().chain([&colours.chromatic_slope]).all(|plane| plane.same_size(mean));
+    if !are_alike || colours.rgb.len() != width * height {
         return std::array::from_fn(|_| Plane::filled(width, height, f32::INFINITY));
     }
     let shown = Shown { fitted, display };
@@ -108,11 +119,13 @@ pub fn display_opponent_variances(
             }
             let noise = Noise { mean: f64::from(mean.max(0.0)), variance: f64::from(luminance) };
             let pixel = shown.pixel(Pixel { x: index % width, y: index / width }, noise);
-            let of_colour = |variance: f32, room_cd_m2: f64| {
-                let unbounded = at(chromatic_slope).powi(2) * variance;
-                if is_variance(variance) { pixel.within_room(unbounded, room_cd_m2) } else { f32::INFINITY }
+            let paling = pixel.variances_of_paling(colours.rgb[index]);
+            let of_colour = |variance: f32, channel: usize| {
+                let unbounded = at(colours.chromatic_slope).powi(2) * variance;
+                let tint = || pixel.within_room(unbounded, rooms_cd_m2[channel]).max(paling[channel]);
+                if is_variance(variance) { tint() } else { f32::INFINITY }
             };
-            [pixel.variance(), of_colour(red_green, rooms_cd_m2[0]), of_colour(yellow_violet, rooms_cd_m2[1])]
+            [pixel.variance(), of_colour(red_green, 0), of_colour(yellow_violet, 1)]
                 .map(|variance| if variance.is_finite() { variance } else { f32::INFINITY })
         })
         .collect();
@@ -122,8 +135,7 @@ pub fn display_opponent_variances(
 /// What of a colour, linear Rec. 709 RGB in scene cd/m², the display shows at `pixel`, cd/m²: more than where it shows nothing.
 #[must_use]
 pub fn display_opponent(fitted: &dyn FittedTone, display: &Display, pixel: Pixel, rgb_cd_m2: [f32; 3]) -> Opponent {
-    let span_cd_m2 = (display.white_cd_m2 - display.black_cd_m2) as f32;
-    opponent(fitted.map_rgb_at(pixel, rgb_cd_m2).map(|channel| span_cd_m2 * channel))
+    Shown { fitted, display }.opponent(pixel, rgb_cd_m2)
 }
 
 /// How far a chromatic signal can go from a grey that is 1 below white, where white is 1: of red and green, or of violet and yellow,
@@ -199,8 +211,9 @@ mod tests {
     /// Of red and green, where luminance has no noise.
     fn chromatic_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
         let slope = display_chromatic_slope(fitted, display, mean);
+        let grey = SceneColours { rgb: &[[1.0; 3]], chromatic_slope: &slope };
         let [_, red_green, _] =
-            display_opponent_variances(fitted, display, mean, &slope, [&one(0.0), variance, &one(0.0)]);
+            display_opponent_variances(fitted, display, mean, grey, [&one(0.0), variance, &one(0.0)]);
         red_green
     }
 
@@ -303,7 +316,7 @@ mod tests {
         let fitted = absolute(&display);
         let pixel = Pixel { x: 0, y: 0 };
         let red_for_green = [1.0, -REC709_WEIGHTS[0] / REC709_WEIGHTS[1], 0.0];
-        let signal = opponent(red_for_green).red_green;
+        let signal = crate::opponent::opponent(red_for_green).red_green;
         // An even spread over three standard deviations to each side has the variance of 3; steps far apart so that both are independent.
         let spread =
             |index: usize, step: usize| ((index * step % COLOURS) as f32 / COLOURS as f32 - 0.5) * 12.0_f32.sqrt();
@@ -322,10 +335,43 @@ mod tests {
             let truth = squares / count - (sum / count).powi(2);
             let slope = display_chromatic_slope(&*fitted, &display, &one(mean));
             let scene = [deviation * deviation, (tint * signal).powi(2), 0.0].map(one);
-            let [_, told, _] = display_opponent_variances(&*fitted, &display, &one(mean), &slope, scene.each_ref());
+            let grey = SceneColours { rgb: &[[1.0; 3]], chromatic_slope: &slope };
+            let [_, told, _] = display_opponent_variances(&*fitted, &display, &one(mean), grey, scene.each_ref());
             let ratio = f64::from(told.get(0, 0)).sqrt() / truth.sqrt().max(1e-6);
             println!("{mean} ± {deviation}, tint {tint}: told {} true {truth} {ratio}", told.get(0, 0));
             assert!((0.9..1.8).contains(&ratio) || truth < 1e-6 && told.get(0, 0) < 1e-6, "{mean}: {ratio}");
+        }
+    }
+
+    /// A red wall pales as it brightens, and noise of its luminance is noise of its colour, by 2001 such luminances.
+    #[test]
+    fn noise_of_luminance_pales_colours() {
+        let display = Display::default();
+        let fitted = absolute(&display);
+        let red = [0.6, 0.06, 0.05];
+        let luminance = crate::photometry::luminance(red);
+        for (mean, deviation, range) in [(30.0, 2.0, 0.9..1.1), (110.0, 8.0, 0.9..1.1), (180.0, 8.0, 0.9..1.3)] {
+            let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
+            for step in -1000..=1000 {
+                let deviations = f64::from(step) / 250.0;
+                let scene = (mean + deviations * deviation) as f32;
+                let rgb = red.map(|channel| channel * scene / luminance);
+                let shown = f64::from(display_opponent(&*fitted, &display, Pixel { x: 0, y: 0 }, rgb).red_green);
+                let weight = (-0.5 * deviations * deviations).exp();
+                weights += weight;
+                sum += weight * shown;
+                squares += weight * shown * shown;
+            }
+            let truth = (squares / weights - (sum / weights).powi(2)).sqrt();
+            let mean_cd_m2 = one(mean as f32);
+            let slope = display_chromatic_slope(&*fitted, &display, &mean_cd_m2);
+            let of_scene = [1.0, crate::opponent::opponent(red.map(|channel| channel / luminance)).red_green, 0.0]
+                .map(|signal: f32| one((deviation as f32 * signal).powi(2)));
+            let colours = SceneColours { rgb: &[red], chromatic_slope: &slope };
+            let [_, told, _] =
+                display_opponent_variances(&*fitted, &display, &mean_cd_m2, colours, of_scene.each_ref());
+            let ratio = f64::from(told.get(0, 0)).sqrt() / truth;
+            assert!(range.contains(&ratio), "{mean} ± {deviation}: {ratio}");
         }
     }
 

@@ -130,13 +130,14 @@ fn judge_by(
     let guide = Guide::of(film, &estimate, denoised.as_ref(), settings);
     still_wanted(settings)?;
     let tone = guide.tone(settings);
-    let scatter = Scatter::of(film, guide.luminance_cd_m2(), tone.as_ref(), settings, raw_inflation);
+    let scatter = Scatter::of(film, &guide, tone.as_ref(), settings, raw_inflation);
     still_wanted(settings)?;
     let displayed_guide = guide.displayed(tone.as_ref(), settings);
     let noise = scatter.luminance_variance_of_mean();
     let thresholds = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
     let sources = Sources {
         film,
+        guide: &guide,
         scatter: &scatter,
         tone: tone.as_ref(),
         thresholds: &thresholds.in_bands,

@@ -23,9 +23,12 @@ pub(crate) fn displayed_variance(subject: &Subject, reference: &Reference, truth
         Plane::from_fn(variance.width(), variance.height(), |x, y| variance.get(x, y) * factor.get(x, y) / spp)
     });
     let tone = truth.tone.as_ref();
-    let slope = seen::display_chromatic_slope(tone, display, &mean);
+    let colours = seen::SceneColours {
+        rgb: &reference.rgb_cd_m2(),
+        chromatic_slope: &seen::display_chromatic_slope(tone, display, &mean),
+    };
     let [achromatic, red_green, yellow_violet] =
-        seen::display_opponent_variances(tone, display, &mean, &slope, of_mean.each_ref());
+        seen::display_opponent_variances(tone, display, &mean, colours, of_mean.each_ref());
     let thresholds = &truth.thresholds.achromatic;
     let gains = thresholds.chromatic_gains()?;
     let equivalent = thresholds.luminance_equivalent_variance(&gains, [&achromatic, &red_green, &yellow_violet]);

@@ -102,7 +102,7 @@ impl Reference {
         let estimate = film.estimate(settings.nits_per_unit);
         let light = SceneLight::of(settings.operator.as_ref(), film.width() as usize, &estimate.rgb_cd_m2);
         let tone = settings.operator.fit(&light.guide(), &settings.viewing, None);
-        let scale = display_scale(film, light.luminance_cd_m2(), tone.as_ref(), &settings);
+        let scale = display_scale(film, &light, &estimate.rgb_cd_m2, tone.as_ref(), &settings);
         Ok(SampleStatistics::of(film, &scale).channels.map(|channel| channel.low_discrepancy_factor))
     }
 

@@ -1,6 +1,8 @@
 //! One pixel's noise through operator and display: the operator asked at three points, or at 21 where it clips.
 
 use crate::display::Display;
+use crate::opponent::{Opponent, opponent};
+use crate::photometry::luminance;
 use crate::tone::{FittedTone, Pixel};
 
 /// Standard deviations from the mean beyond which normal noise is let go: 4 lose 0.1 % of the variance.
@@ -25,6 +27,11 @@ impl Shown<'_> {
     pub(super) fn chromatic_slope(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
         let span_cd_m2 = (self.display.white_cd_m2 - self.display.black_cd_m2) as f32;
         span_cd_m2 * self.fitted.chromatic_slope_at(pixel, scene_cd_m2)
+    }
+
+    pub(super) fn opponent(&self, pixel: Pixel, rgb_cd_m2: [f32; 3]) -> Opponent {
+        let span_cd_m2 = (self.display.white_cd_m2 - self.display.black_cd_m2) as f32;
+        opponent(self.fitted.map_rgb_at(pixel, rgb_cd_m2).map(|channel| span_cd_m2 * channel))
     }
 
     /// A pixel with noisy light.
@@ -153,6 +160,31 @@ impl NoisyPixel<'_> {
             sum += weight * fits(self.relative(scene));
         }
         (sum / weights) as f32
+    }
+
+    /// Variances of red–green and yellow–violet as displayed, (cd/m²)², where noise of luminance brightens and darkens a colour, linear
+    /// Rec. 709 RGB of any strength, that the display then shows paler and less so. 0 where the colour fits the display at all points.
+    pub(super) fn variances_of_paling(&self, rgb: [f32; 3]) -> [f32; 2] {
+        let strength = luminance(rgb);
+        let (Some(points), true) = (&self.points, strength > 0.0 && strength.is_finite()) else { return [0.0; 2] };
+        let largest = rgb.into_iter().fold(0.0, f32::max) / strength;
+        if points.relative[2] * largest <= 1.0 {
+            return [0.0; 2];
+        }
+        let Noise { mean, .. } = self.noise;
+        let shown = [mean - points.below, mean, mean + points.above].map(|scene| {
+            let scale = (scene / f64::from(strength)) as f32;
+            self.shown.opponent(self.pixel, rgb.map(|channel| channel * scale))
+        });
+        let weights = points.weights(self.noise);
+        let variance = |signal: fn(&Opponent) -> f32| {
+            let signals = shown.each_ref().map(|shown| f64::from(signal(shown)));
+            let moment = |power: i32| {
+                weights.iter().zip(signals).map(|(weight, signal)| weight * signal.powi(power)).sum::<f64>()
+            };
+            (moment(2) - moment(1).powi(2)).max(0.0) as f32
+        };
+        [variance(|shown| shown.red_green), variance(|shown| shown.yellow_violet)]
     }
 
     /// Whether normal noise reaches over a clip of the display. `relative`: below, at and above the mean.

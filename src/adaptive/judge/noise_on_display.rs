@@ -5,8 +5,8 @@ use super::super::statistics::{DifferenceOnDisplay, by_channel};
 use crate::film::{CHANNELS, Film, Halves, share_of_mean};
 use crate::sampler::Half;
 use fechner_perception::opponent::Opponent;
-use fechner_perception::seen;
-use fechner_perception::tone::{FittedTone, Pixel};
+use fechner_perception::seen::{self, SceneColours};
+use fechner_perception::tone::{FittedTone, Pixel, SceneLight};
 use fechner_perception::{PIXELS_A_TASK, Plane};
 use rayon::prelude::*;
 
@@ -24,8 +24,8 @@ pub fn variance_shares(film: &Film) -> Plane {
 pub(super) struct NoiseOnDisplay<'a> {
     /// [`variance_shares`].
     pub(super) shares: &'a Plane,
-    /// [`seen::display_chromatic_slope`] of the guide.
-    pub(super) chromatic_slope: &'a Plane,
+    /// Of the guide.
+    pub(super) colours: SceneColours<'a>,
     pub(super) tone: &'a dyn FittedTone,
     pub(super) settings: &'a LoopSettings,
     /// Multiplies every variance.
@@ -64,7 +64,7 @@ impl NoiseOnDisplay<'_> {
                 (of_mean * nits_squared) as f32
             })
         });
-        let shown = seen::display_opponent_variances(self.tone, display, light, self.chromatic_slope, scene.each_ref());
+        let shown = seen::display_opponent_variances(self.tone, display, light, self.colours, scene.each_ref());
         let mut shown = shown.into_iter();
         scene.map(|scene| Displayed { scene, shown: shown.next().expect("a channel's") })
     }
@@ -78,23 +78,30 @@ struct Displayed {
 }
 
 /// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display
-/// makes of a pixel's own noise, before any pooling. From scene units.
-pub fn display_scale(film: &Film, guide: &Plane, tone: &dyn FittedTone, settings: &LoopSettings) -> [Plane; CHANNELS] {
-    let chromatic_slope = seen::display_chromatic_slope(tone, &settings.viewing.display, guide);
-    let shares = variance_shares(film);
-    NoiseOnDisplay { shares: &shares, chromatic_slope: &chromatic_slope, tone, settings, inflation: 1.0 }
-        .scales(guide, |pixel, c| film.halves(pixel).sample_variance(c))
+/// makes of a pixel's own noise, before any pooling. From scene units. `rgb_cd_m2`: the picture whose luminance `light` is.
+pub fn display_scale(
+    film: &Film,
+    light: &SceneLight,
+    rgb_cd_m2: &[[f32; 3]],
+    tone: &dyn FittedTone,
+    settings: &LoopSettings,
+) -> [Plane; CHANNELS] {
+    let luminance = light.luminance_cd_m2();
+    let chromatic_slope = &seen::display_chromatic_slope(tone, &settings.viewing.display, luminance);
+    let colours = SceneColours { rgb: rgb_cd_m2, chromatic_slope };
+    NoiseOnDisplay { shares: &variance_shares(film), colours, tone, settings, inflation: 1.0 }
+        .scales(luminance, |pixel, c| film.halves(pixel).sample_variance(c))
 }
 
-/// What the halves differ by as displayed, by channel, and what independent samples about the guide's luminance would. `guide`: cd/m².
-/// `chromatic_slope`: [`seen::display_chromatic_slope`] of it.
+/// What the halves differ by as displayed, by channel, and what independent samples about the guide's luminance would. `guide`: that,
+/// cd/m². `colours`: of the guide.
 ///
 /// Means of a half scatter by more than the picture's, whose noise this is to correct: above a clip they reach below it more often, so
 /// that what is taken off is rather too little.
 pub(super) fn difference_on_display(
     film: &Film,
     guide: &Plane,
-    chromatic_slope: &Plane,
+    colours: SceneColours<'_>,
     tone: &dyn FittedTone,
     settings: &LoopSettings,
 ) -> [DifferenceOnDisplay; CHANNELS] {
@@ -102,7 +109,7 @@ pub(super) fn difference_on_display(
         Halves::Both(both) => both.map(|half| 0.5 / half.samples as f32).iter().sum(),
         Halves::Only(_) => 0.0,
     });
-    let noise = NoiseOnDisplay { shares: &of_halves, chromatic_slope, tone, settings, inflation: 1.0 };
+    let noise = NoiseOnDisplay { shares: &of_halves, colours, tone, settings, inflation: 1.0 };
     let (squared, expected) = rayon::join(
         || squared_differences(film, guide.width(), tone, settings),
         || noise.displayed(guide, |pixel, c| film.halves(pixel).sample_variance(c)),

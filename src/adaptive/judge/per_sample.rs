@@ -3,7 +3,7 @@
 use super::super::missed::FoundLight;
 use super::super::settings::LoopSettings;
 use super::over_white::OverWhite;
-use super::steps::{MissedNoise, Scatter, Thresholds, chromatic_gains};
+use super::steps::{Guide, MissedNoise, Scatter, Thresholds, chromatic_gains};
 use super::{JudgeError, Purpose, still_wanted};
 use crate::film::Film;
 use crate::sampler::Half;
@@ -26,6 +26,7 @@ pub(super) struct PerSample {
 /// What it is found from.
 pub(super) struct Sources<'a> {
     pub(super) film: &'a Film,
+    pub(super) guide: &'a Guide<'a>,
     pub(super) scatter: &'a Scatter,
     pub(super) tone: &'a dyn FittedTone,
     pub(super) thresholds: &'a ThresholdMap,
@@ -50,11 +51,11 @@ impl PerSample {
 
     /// By what samples have met; and of the halves, where these are to decide by the light that they have found.
     fn met(sources: &Sources<'_>, lights: Option<&[FoundLight; 2]>) -> Result<Self, JudgeError> {
-        let &Sources { film, scatter, tone, thresholds, settings, inflation } = sources;
+        let &Sources { film, guide, scatter, tone, thresholds, settings, inflation } = sources;
         let gains = chromatic_gains(thresholds, settings)?;
         still_wanted(settings)?;
         let of_halves = lights.map(|lights| {
-            let scales = scatter.scales_of_halves(film, lights, tone, settings, inflation);
+            let scales = scatter.scales_of_halves(film, guide, lights, tone, settings, inflation);
             scatter.per_sample_of_halves(film, scales.each_ref(), thresholds, gains.as_ref())
         });
         let met = scatter.pooled_per_sample(thresholds, gains.as_ref());

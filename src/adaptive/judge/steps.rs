@@ -13,7 +13,7 @@ use fechner_perception::Plane;
 use fechner_perception::colour::ChromaticGains;
 use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FreshNoise};
 use fechner_perception::model::{ModelInputs, ThresholdModel};
-use fechner_perception::seen;
+use fechner_perception::seen::{self, SceneColours};
 use fechner_perception::threshold::{GuideNoise, ThresholdInputs, ThresholdMap, threshold_map};
 use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, Pixel, SceneLight};
@@ -70,20 +70,21 @@ pub(super) struct Scatter {
 }
 
 impl Scatter {
-    /// `guide`: its luminance, cd/m².
     pub(super) fn of(
         film: &Film,
-        guide: &Plane,
+        guide: &Guide<'_>,
         tone: &dyn FittedTone,
         settings: &LoopSettings,
         inflation: f64,
     ) -> Self {
         let shares = variance_shares(film);
-        let chromatic_slope = seen::display_chromatic_slope(tone, &settings.viewing.display, guide);
-        let noise = NoiseOnDisplay { shares: &shares, chromatic_slope: &chromatic_slope, tone, settings, inflation };
+        let luminance = guide.luminance_cd_m2();
+        let chromatic_slope = seen::display_chromatic_slope(tone, &settings.viewing.display, luminance);
+        let colours = SceneColours { rgb: &guide.rgb_cd_m2, chromatic_slope: &chromatic_slope };
+        let noise = NoiseOnDisplay { shares: &shares, colours, tone, settings, inflation };
         let (scales, differences) = rayon::join(
-            || noise.scales(guide, |pixel, c| film.halves(pixel).sample_variance(c)),
-            || difference_on_display(film, guide, &chromatic_slope, tone, settings),
+            || noise.scales(luminance, |pixel, c| film.halves(pixel).sample_variance(c)),
+            || difference_on_display(film, luminance, colours, tone, settings),
         );
         let statistics = SampleStatistics::of_displayed(film, &scales, &differences);
         Self { shares, chromatic_slope, scales, statistics }
@@ -115,17 +116,18 @@ impl Scatter {
     /// Displayed over scene variance by channel for what each half decides by: of the other half's light and noise. Where both halves' went
     /// in, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
     /// tube of light made a picture 2.75 % too bright (`benches/results/sampling.md`, lamps on black, dust and wires). Of both are still which pixels shine, how
-    /// many samples there are, and what is seen over white. `lights`: of the halves.
+    /// many samples there are, the hues of the guide, and what is seen over white. `lights`: of the halves.
     pub(super) fn scales_of_halves(
         &self,
         film: &Film,
+        guide: &Guide<'_>,
         lights: &[FoundLight; 2],
         tone: &dyn FittedTone,
         settings: &LoopSettings,
         inflation: f64,
     ) -> [[Plane; CHANNELS]; 2] {
-        let (shares, chromatic_slope) = (&self.shares, &self.chromatic_slope);
-        let noise = NoiseOnDisplay { shares, chromatic_slope, tone, settings, inflation };
+        let colours = SceneColours { rgb: &guide.rgb_cd_m2, chromatic_slope: &self.chromatic_slope };
+        let noise = NoiseOnDisplay { shares: &self.shares, colours, tone, settings, inflation };
         Half::BOTH.map(|half| {
             let other = half.other();
             let variance = |pixel: usize, c: usize| film.half(other)[pixel].sample_variance(c);
