@@ -23,6 +23,31 @@ fn motion_that_is_no_number_is_told() {
     }
 }
 
+/// Motion to the frame before alone was refused by a message that had it among those that are known.
+#[test]
+fn motion_to_the_frame_before_alone_is_heeded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "a.exr", |_| [50.0; 3]);
+    let motion = |name: &str, channels: [&str; 2]| {
+        let mut picture = Picture::new(SIDE as u32, SIDE as u32);
+        channels.iter().zip([3.0, 1.0]).for_each(|(name, value)| picture.push_f32(name, vec![value; SIDE * SIDE]));
+        write_exr(&folder.path().join(name), &picture).expect("written");
+        let threshold = ["threshold", "a.exr", "-o", "t.exr", "--velocity", name];
+        let said = run(folder.path(), &threshold);
+        let seen = read_exr(&folder.path().join("t.exr")).expect("read");
+        (seen.channel("threshold.Y").expect("thresholds").to_vec(), said)
+    };
+    let (forward, said) = motion("forward.exr", ["velocity.X", "velocity.Y"]);
+    assert!(!said.contains("before alone"), "{said}");
+    for channels in [["backward.u", "backward.v"], ["velocity_previous.X", "velocity_previous.Y"]] {
+        let (backward, said) = motion("before.exr", channels);
+        assert_eq!(backward, forward, "as fast the other way");
+        assert!(said.contains("note: before.exr: it has motion to the frame before alone"), "{said}");
+        let layer = channels[0].split('.').next().expect("a layer");
+        assert!(said.contains(&format!("motion from the channels of {layer} at")), "{said}");
+    }
+}
+
 /// Frames of one sequence have one shape.
 #[test]
 fn pixels_that_change_their_shape_are_no_sequence() {
