@@ -65,11 +65,10 @@ impl InputPicture {
 
     fn read_in(source: Source<'_>, unit: Unit) -> Result<Self> {
         let path = source.path;
-        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        match ending.as_deref() {
+        match ending_of(path).as_deref() {
             Some("exr") => Self::from_exr(source, &channels::read_picture(path)?, unit),
             Some("hdr") => Self::from_hdr(source, unit.in_cd_m2(source, || None)?),
-            Some("png" | "jpg" | "jpeg") => Self::from_codes(source),
+            _ if is_of_codes(path) => Self::from_codes(source),
             _ => bail!("{}: not a picture that can be judged: .exr, .hdr, .png and .jpg are read", path.display()),
         }
     }
@@ -168,6 +167,16 @@ impl InputPicture {
 fn bytes_a_channel(image: &DynamicImage) -> u8 {
     let color = image.color();
     color.bytes_per_pixel() / color.channel_count()
+/// Whether a file of this name holds what is sent to a display: what values mean goes by their file's name.
+pub(in crate::cli) fn is_of_codes(path: &Path) -> bool {
+    matches!(ending_of(path).as_deref(), Some("png" | "jpg" | "jpeg"))
+}
+
+/// In lower case.
+fn ending_of(path: &Path) -> Option<String> {
+    path.extension()?.to_str().map(str::to_ascii_lowercase)
+}
+
 }
 
 /// How much of each pixel an image covers, 0 to 1; `None` where that is all of all of them.
