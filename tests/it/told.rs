@@ -48,6 +48,24 @@ fn motion_to_the_frame_before_alone_is_heeded() {
     }
 }
 
+/// It became black without a word.
+#[test]
+fn light_below_zero_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "a.exr", |pixel| if pixel < 3 { [-5.0; 3] } else { [50.0, 50.0, -5.0] });
+    write(folder.path(), "wide.exr", |_| [50.0, 50.0, -5.0]);
+    let said = "note: a.exr: luminance below 0 in 3 pixels was replaced by black";
+    for arguments in [
+        &["threshold", "a.exr", "-o", "t.exr"][..],
+        &["tonemap", "a.exr", "-o", "t.png", "--operator", "agx"],
+        &["compare", "wide.exr", "a.exr"],
+    ] {
+        let (_, words) = fechner(folder.path(), arguments);
+        assert_eq!(words.matches("luminance below 0").count(), 1, "{words}");
+        assert!(words.contains(said), "{words}");
+    }
+}
+
 /// Frames of one sequence have one shape.
 #[test]
 fn pixels_that_change_their_shape_are_no_sequence() {

@@ -4,7 +4,7 @@ use super::{Codes, Content, InputPicture};
 use crate::cli::channels::{self, Colour};
 use crate::cli::kept_tone::{self, KeptTone};
 use anyhow::{Context, Result, bail};
-use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES};
+use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, negative_light};
 use fechner::hdr_read::{self, HdrHeader, with_known_header};
 use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
@@ -85,6 +85,9 @@ impl InputPicture {
         for text in channels::guess(exr).iter().chain(&picture.notes).chain(&kept_tone::display_not_read(exr)) {
             source.note(text);
         }
+        if let Unit::OfLight(_) = unit {
+            negative_light(&picture.rgb).iter().for_each(|text| source.note(text));
+        }
         let kept_tone = KeptTone::of(exr);
         let content = match kept_tone {
             Some(KeptTone::Displayed) => Content::Emitted { nits_per_unit },
@@ -164,9 +167,6 @@ impl InputPicture {
     }
 }
 
-fn bytes_a_channel(image: &DynamicImage) -> u8 {
-    let color = image.color();
-    color.bytes_per_pixel() / color.channel_count()
 /// Whether a file of this name holds what is sent to a display: what values mean goes by their file's name.
 pub(in crate::cli) fn is_of_codes(path: &Path) -> bool {
     matches!(ending_of(path).as_deref(), Some("png" | "jpg" | "jpeg"))
@@ -177,6 +177,9 @@ fn ending_of(path: &Path) -> Option<String> {
     path.extension()?.to_str().map(str::to_ascii_lowercase)
 }
 
+fn bytes_a_channel(image: &DynamicImage) -> u8 {
+    let color = image.color();
+    color.bytes_per_pixel() / color.channel_count()
 }
 
 /// How much of each pixel an image covers, 0 to 1; `None` where that is all of all of them.
