@@ -24,8 +24,8 @@ mod window;
 
 use attributes::{add_missing, attributes, part_of, primaries};
 use checks::{check_memory, guarded, read_headers};
-pub use colour::ScenePicture;
 pub(crate) use colour::{Replaced, make_finite};
+pub use colour::{ScenePicture, negative_light};
 use wanted::Wanted;
 pub use window::Window;
 

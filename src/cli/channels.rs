@@ -38,6 +38,9 @@ pub(super) fn motion_planes(path: &Path, exr: &ExrImage) -> Result<FrameMotion> 
             BACKWARD_LAYERS.join(" and ")
         );
     };
+    if motion(exr).is_none() {
+        note(path, "it has motion to the frame before alone: to the next one things are taken to move on as they did");
+    }
     let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
         Ok([motion_plane(path, exr, x)?, motion_plane(path, exr, y)?])
     };
@@ -120,7 +123,7 @@ const UPWARD_LAYERS: [&str; 2] = ["forward", "backward"];
 ///
 /// A layer counts if one part of its name, between dots, is one that renderers use (`velocity.X`, `ViewLayer.Vector.X`,
 /// `forward.left.u`, `motion.x`); case does not matter.
-pub(super) fn motion(exr: &ExrImage) -> Option<(&str, [&[f32]; 2])> {
+fn motion(exr: &ExrImage) -> Option<(&str, [&[f32]; 2])> {
     let names = exr.names();
     for name in MOTION_LAYERS {
         for [across, down] in VECTOR_PARTS {
@@ -143,7 +146,8 @@ struct BothMotions {
 /// What layers of motion to the previous frame are called.
 const BACKWARD_LAYERS: [&str; 2] = ["velocity_previous", "backward"];
 
-/// Both motions: ours, Blender's `Vector` of four, or any that [`motion`] finds, which is taken to have been the same before.
+/// Both motions: ours, Blender's `Vector` of four, or any that [`motion`] and [`backward_motion`] find. Of one alone things are taken to move
+/// as much the other way.
 fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
     let negated = |values: &[f32]| values.iter().map(|value| -value).collect::<Vec<f32>>();
     let names = exr.names();
@@ -155,18 +159,30 @@ fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
         };
         return Some(BothMotions { to_next: [negated(z), w.to_vec()], to_previous: [x.to_vec(), negated(y)] });
     }
-    let downwards = |layer: &str, y: &[f32]| {
-        if UPWARD_LAYERS.iter().any(|name| is_called(layer, name)) { negated(y) } else { y.to_vec() }
+    let downwards = |(layer, [x, y]): (&str, [&[f32]; 2])| {
+        let is_upward = UPWARD_LAYERS.iter().any(|name| is_called(layer, name));
+        [x.to_vec(), if is_upward { negated(y) } else { y.to_vec() }]
     };
-    let (layer, [x, y]) = motion(exr)?;
-    let (x, y) = (x.to_vec(), downwards(layer, y));
-    let backward = VECTOR_PARTS.iter().find_map(|[across, down]| {
+    let as_before = |[x, y]: &[Vec<f32>; 2]| [negated(x), negated(y)];
+    let (to_next, to_previous) = (motion(exr).map(downwards), backward_motion(exr).map(downwards));
+    let to_next = to_next.or_else(|| to_previous.as_ref().map(as_before))?;
+    let to_previous = to_previous.unwrap_or_else(|| as_before(&to_next));
+    Some(BothMotions { to_next, to_previous })
+}
+
+/// Motion to the previous frame as [`motion`] has it to the next one.
+fn backward_motion(exr: &ExrImage) -> Option<(&str, [&[f32]; 2])> {
+    let names = exr.names();
+    VECTOR_PARTS.iter().find_map(|&[across, down]| {
         let is_backward = |layer: &&str| BACKWARD_LAYERS.iter().any(|name| is_called(layer, name));
         let layer = layers_with(&names, &[across, down]).into_iter().find(is_backward)?;
-        Some([exr.part(layer, across)?.to_vec(), downwards(layer, exr.part(layer, down)?)])
-    });
-    let to_previous = backward.unwrap_or_else(|| [negated(&x), negated(&y)]);
-    Some(BothMotions { to_next: [x, y], to_previous })
+        Some((layer, [exr.part(layer, across)?, exr.part(layer, down)?]))
+    })
+}
+
+/// The layer that motion is taken from: to the next frame, else to the previous one.
+pub(super) fn motion_layer(exr: &ExrImage) -> Option<&str> {
+    motion(exr).or_else(|| backward_motion(exr)).map(|(layer, _)| layer)
 }
 
 /// Whether a channel may be one of those that [`both_motions`] looks for.
@@ -383,5 +399,20 @@ mod tests {
         let both = ["R", "backward.u", "backward.v", "forward.u", "forward.v"];
         assert_eq!(of(&both), Some([3.0, -4.0, 1.0, -2.0]));
         assert_eq!(of(&["R", "G", "B"]), None);
+    }
+
+    /// Renderers that know only where things were were refused.
+    #[test]
+    fn motion_to_the_previous_frame_alone_goes_on() {
+        let of = |names: &[&str]| {
+            let exr = exr(names);
+            let BothMotions { to_next: [a, b], to_previous: [c, d] } = both_motions(&exr)?;
+            Some((motion_layer(&exr)?.to_owned(), [a[0], b[0], c[0], d[0]]))
+        };
+        let found = |layer: &str, motion| Some((layer.to_owned(), motion));
+        assert_eq!(of(&["R", "backward.u", "backward.v"]), found("backward", [-1.0, 2.0, 1.0, -2.0]));
+        let ours = ["R", "velocity_previous.X", "velocity_previous.Y"];
+        assert_eq!(of(&ours), found("velocity_previous", [-1.0, -2.0, 1.0, 2.0]));
+        assert_eq!(of(&["backward.u", "backward.v", "mv.X", "mv.Y"]), found("mv", [2.0, 3.0, 0.0, -1.0]));
     }
 }

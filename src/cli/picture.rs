@@ -2,7 +2,7 @@
 
 mod from_file;
 
-pub(super) use self::from_file::{BEFORE_BLACK, Source, note};
+pub(super) use self::from_file::{BEFORE_BLACK, Source, is_of_codes, note};
 use super::covered::{Covered, Mapping};
 use super::kept_tone::KeptTone;
 use anyhow::{Context, Result};

@@ -213,11 +213,12 @@ fn all_written(files: impl IntoIterator<Item = anyhow::Result<()>>) -> anyhow::R
 /// Writes a picture that cannot be where it should into a new folder among temporary files, and says so: its samples took long.
 /// Others may write there too, and must not know the folder's name beforehand.
 fn kept_elsewhere(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>, error: anyhow::Error) -> anyhow::Error {
-    let name = path.file_name().unwrap_or(OsStr::new("picture"));
+    // Names may be longer where it should be than among temporary files.
+    let name = output::shortened_name(path.file_name().unwrap_or(OsStr::new("picture")));
     let keep = || -> anyhow::Result<PathBuf> {
         let folder = tempfile::Builder::new().prefix("fechner-").tempdir()?;
-        write(&folder.path().join(name))?;
-        Ok(folder.keep().join(name))
+        write(&folder.path().join(&name))?;
+        Ok(folder.keep().join(&name))
     };
     match keep() {
         Ok(elsewhere) => error.context(format!("the picture is in {}", elsewhere.display())),
@@ -245,4 +246,20 @@ pub(super) fn write_picture(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One that was too long for its folder was too long for the other as well, and the picture was lost.
+    #[test]
+    fn a_picture_of_a_long_name_is_kept_elsewhere() {
+        let long = PathBuf::from(format!("{}.exr", "w".repeat(252)));
+        let write = |path: &Path| Ok(std::fs::write(path, "light")?);
+        let said = kept_elsewhere(&long, write, anyhow!("no room")).to_string();
+        let kept = Path::new(said.strip_prefix("the picture is in ").expect("where it is"));
+        assert_eq!(std::fs::read_to_string(kept).expect("written"), "light");
+        std::fs::remove_dir_all(kept.parent().expect("a folder")).expect("removed");
+    }
 }

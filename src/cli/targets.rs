@@ -1,7 +1,7 @@
 //! The files that a command reads and writes.
 
 use anyhow::bail;
-use fechner::output::{folder_of, target_of};
+use fechner::output::{check_name, folder_of, target_of};
 use fechner::scene::load::was_read;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -9,8 +9,10 @@ use std::path::{Path, PathBuf};
 /// A file, where there is one, with the option or words that name it.
 pub(super) type Named<'a> = (&'a str, Option<&'a Path>);
 
-/// Refuses to write in the place of what is read, or one file for two purposes: a reference or a scene is lost by that.
+/// Refuses to write in the place of what is read, or one file for two purposes: a reference or a scene is lost by that. Refuses names that
+/// no file can have as well, of frames to come too.
 pub(super) fn check_kept(read: &[Named], written: &[Named]) -> anyhow::Result<()> {
+    written.iter().filter_map(|&(_, path)| path).try_for_each(check_name)?;
     check_distinct(written)?;
     let sources: HashMap<PathBuf, &str> =
         read.iter().filter_map(|&(what, path)| Some((location(path?), what))).collect();
@@ -100,5 +102,7 @@ mod tests {
         let message = refused.expect_err("the scene").to_string();
         assert!(message.contains("--json would replace the scene that is read"), "{message}");
         assert_eq!(display_file(Some("desktop")).1, None);
+        let long = folder.path().join("w".repeat(256));
+        assert!(check_kept(&[], &[("-o", Some(&other)), ("a frame's record", Some(&long))]).is_err());
     }
 }

@@ -9,7 +9,7 @@ use self::write::write;
 use super::animate::parse_lapse_rate;
 use super::covered::Covered;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
-use super::picture::InputPicture;
+use super::picture::{InputPicture, is_of_codes};
 use super::seeing::{self, DEFAULT_DISPLAY, display_help, operator_values_or_all};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
@@ -127,7 +127,7 @@ impl SceneFrame {
         let (alpha, part_of) = (picture.alpha().map(<[f32]>::to_vec), picture.part_of());
         let (width, height) = picture.size();
         let Some(rgb_cd_m2) = picture.light_cd_m2() else {
-            bail!("{}: ready for a display already; .exr and .hdr files hold scenes", path.display());
+            bail!(is_ready(path));
         };
         if let Some(Gaze(Pixel { x, y })) = arguments.gaze.filter(|gaze| gaze.0.x >= width || gaze.0.y >= height) {
             bail!("--gaze {x},{y} is outside {}, which has {width}x{height} pixels", path.display());
@@ -171,6 +171,10 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
         output::check_writable(state)?;
     }
     let format = output::check_target(&targets[0])?;
+    // Before an operator is asked for, by which no such file could be shown either.
+    if let Some(path) = arguments.input.iter().find(|path| is_of_codes(path)) {
+        bail!(is_ready(path));
+    }
     let Some(operator) = arguments.operator.as_deref() else {
         return run_as_rendered(arguments, format, &targets);
     };
@@ -208,6 +212,10 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
         json_file::write(path, &state)?;
     }
     Ok(())
+}
+
+fn is_ready(path: &Path) -> String {
+    format!("{}: ready for a display already; .exr and .hdr files hold scenes", path.display())
 }
 
 /// Its inputs in the order of the numbers in their names: a shell puts 10 before 9.

@@ -4,7 +4,7 @@ use super::attributes::{COLOR_INTEROP_ID, linear_primaries};
 use super::layers::luminance_layer;
 use super::{ExrImage, Window};
 use crate::output::Attribute;
-use fechner_perception::photometry::REC709_WEIGHTS;
+use fechner_perception::photometry::{REC709_WEIGHTS, luminance};
 use fechner_perception::primaries::{Primaries, apply};
 
 /// The picture that a file is meant to show.
@@ -141,6 +141,19 @@ pub(crate) fn make_finite(channels: &mut [&mut [f32]]) -> Option<Replaced> {
     Some(Replaced { count, infinity })
 }
 
+/// What to say of pixels that take light away, which none is seen to do: black is shown. Not of colours outside Rec.709, which have negative channels and
+/// a luminance above 0.
+pub fn negative_light<'a>(rgb: impl IntoIterator<Item = &'a [f32; 3]>) -> Option<String> {
+    // What other primaries than the file's make of black and of colours at the edge of what is seen.
+    const ROUNDING: f32 = 1e-5;
+    let is_negative = |rgb: &&[f32; 3]| {
+        let largest = rgb.iter().fold(0.0_f32, |largest, value| largest.max(value.abs()));
+        luminance(**rgb) < -ROUNDING * largest
+    };
+    let count = rgb.into_iter().filter(is_negative).count();
+    (count > 0).then(|| format!("luminance below 0 in {count} pixels was replaced by black"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::tests::asset;
@@ -206,6 +219,15 @@ mod tests {
         assert_eq!(replaced([10.0, f32::INFINITY, f32::NAN]), [10.0, 65504.0, 0.0]);
         assert_eq!(replaced([f32::INFINITY; 3]), [65504.0; 3]);
         assert_eq!(replaced([1e6, f32::INFINITY, f32::NEG_INFINITY]), [1e6, 1e6, 0.0]);
+    }
+
+    #[test]
+    fn light_below_zero_is_told_and_wide_colours_are_not() {
+        // The green of Rec.2020 and a blue at the edge of what is seen, in Rec.709.
+        let wide = [[-0.59, 1.13, -0.1], [0.3, -0.09, 0.1], [0.0; 3], [1.0; 3]];
+        assert_eq!(negative_light(&wide), None);
+        let told = negative_light(wide.iter().chain(&[[-0.5; 3], [0.1, -0.1, 0.1]])).unwrap();
+        assert!(told.contains("2 pixels"), "{told}");
     }
 
     /// A file of ours with its windows and chromaticities changed by hand.

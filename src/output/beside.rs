@@ -66,6 +66,7 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         }
         Err(error) => return Err(io(error)),
     }
+    check_name(path)?;
     let prefix = part_prefix(name);
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).rand_bytes(PART_LETTERS).suffix(PART_SUFFIX);
@@ -139,6 +140,36 @@ fn part_prefix(name: &OsStr) -> OsString {
     let mut prefix = hidden_within(LONGEST_NAME - ".".len() - PART_LETTERS - PART_SUFFIX.len(), name);
     prefix.push(".");
     prefix
+}
+
+/// Tells whether a file may be called so where it will be, before the work is done: the name that it has until it is complete is another, and
+/// is taken whatever this one is. Its folder may still have to be made.
+///
+/// # Errors
+/// [`OutputError::LongName`] if the system takes no such name.
+pub fn check_name(path: &Path) -> Result<(), OutputError> {
+    let target = target_of(path).unwrap_or_else(|_| path.to_owned());
+    let Some(name) = target.file_name() else { return Ok(()) };
+    let folder = folder_of(&target).ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
+    match folder.join(name).symlink_metadata() {
+        Err(error) if error.kind() == std::io::ErrorKind::InvalidFilename => {
+            Err(OutputError::LongName { path: path.to_owned(), bytes: name.len() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A name that every file system takes: of one that is too long the end gives way, but for its ending.
+pub fn shortened_name(name: &OsStr) -> OsString {
+    if name.len() <= LONGEST_NAME {
+        return name.to_owned();
+    }
+    let text = name.to_string_lossy();
+    let ending = match text.rfind('.') {
+        Some(dot) if text.len() - dot <= LONGEST_NAME => &text[dot..],
+        _ => "",
+    };
+    OsString::from(format!("{}{ending}", &text[..text.floor_char_boundary(LONGEST_NAME - ending.len())]))
 }
 
 /// The name of a hidden file that stands beside the one called `name`.
@@ -304,6 +335,27 @@ mod tests {
             assert_eq!(names(folder.path()), [name]);
             std::fs::remove_file(path).unwrap();
         }
+    }
+
+    /// The new file beside it had a name that was taken, and the picture was lost when it was renamed.
+    #[test]
+    fn names_that_no_file_can_have_are_refused_beforehand() {
+        let folder = tempfile::tempdir().unwrap();
+        let of = |letters: usize| folder.path().join("no/folder/yet").join("w".repeat(letters));
+        assert!(check_name(&of(255)).is_ok());
+        assert!(check_name(&of(256)).unwrap_err().to_string().contains("256 bytes"));
+        let error = create_beside(&folder.path().join("w".repeat(256))).unwrap_err();
+        assert!(matches!(error, OutputError::LongName { bytes: 256, .. }), "{error}");
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_shortened_name_keeps_its_ending() {
+        let shortened = |name: &str| shortened_name(OsStr::new(name)).into_string().unwrap();
+        assert_eq!(shortened("a.exr"), "a.exr");
+        assert_eq!(shortened(&format!("{}.exr", "w".repeat(252))), format!("{}.exr", "w".repeat(251)));
+        assert_eq!(shortened(&format!("{}.exr", "ä".repeat(200))), format!("{}.exr", "ä".repeat(125)));
+        assert_eq!(shortened(&format!("a.{}", "w".repeat(300))), format!("a.{}", "w".repeat(253)));
     }
 
     #[test]

@@ -20,7 +20,8 @@ pub mod rendered;
 mod srgb_codes;
 
 pub use beside::{
-    abandon_unfinished, folder_of, hidden_name, remove_leftovers, target_of, write_beside, write_beside_by_name,
+    abandon_unfinished, check_name, folder_of, hidden_name, remove_leftovers, shortened_name, target_of, write_beside,
+    write_beside_by_name,
 };
 pub use exr_file::write_exr;
 pub use frame_rate::FRAMES_PER_SECOND;
@@ -206,6 +207,14 @@ pub enum OutputError {
         path: PathBuf,
         /// What it is.
         found: &'static str,
+    },
+    /// The system takes no such name.
+    #[error("cannot write {}: the system takes no name like this one, of {bytes} bytes; choose a shorter one", .path.display())]
+    LongName {
+        /// The file asked for.
+        path: PathBuf,
+        /// Length of its name.
+        bytes: usize,
     },
     /// The name's ending says nothing about the format.
     #[error("cannot write {}: {}; end the name in .png or .exr", .path.display(), extension_problem(.path))]

@@ -116,6 +116,38 @@ fn figures_that_are_lost_take_nothing_along() {
     assert!(folder.path().join("kept.png").exists(), "{words}");
 }
 
+/// The picture of a name that no file can have was lost when all of it was rendered: the name that it has until it is complete is a shorter
+/// one. No sample is taken for it.
+#[test]
+#[cfg(unix)]
+fn names_that_are_too_long_are_refused_beforehand() {
+    let folder = folder();
+    let long = |ending: &str| format!("{}{ending}", "w".repeat(256 - ending.len()));
+    let (picture, film, map) = (long(".exr"), long(".film"), format!("samples={}", long(".png")));
+    let (json, frames, record, video) = (long(".json"), long(".0.png"), "w".repeat(249), long(".y4m"));
+    let (frames, record) = (frames.replace(".0.", ".#."), format!("{record}.#.png"));
+    let elsewhere = format!("no/such/folder/{frames}");
+    let shot = ["animate", "s.toml", "--size", "8x8", "--spp", "4", "--frames", "0..1", "-o"];
+    let still = ["render", "s.toml", "--size", "8x8", "--spp", "4", "-o"];
+    for arguments in [
+        &[&still[..], &[&picture]].concat(),
+        &[&still[..], &["a.png", "--checkpoint", &film]].concat(),
+        &[&still[..], &["a.png", "--map", &map]].concat(),
+        &[&still[..], &["a.png", "--json", &json]].concat(),
+        &[&shot[..], &[&frames]].concat(),
+        &[&shot[..], &[&elsewhere]].concat(),
+        &[&shot[..], &[&record]].concat(),
+        &[&shot[..], &["f.#.png", "--video", &video]].concat(),
+    ] {
+        let output = fechner(folder.path()).args(arguments).output().expect("runs");
+        let words = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{words}");
+        let error = words.lines().last().expect("an error");
+        assert!(error.contains("the system takes no name like this one, of 256 bytes"), "{words}");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "nothing is written");
+    }
+}
+
 /// Nor do they replace what the scene is made of.
 #[test]
 fn outputs_replace_no_texture() {

@@ -53,6 +53,16 @@ fn skies_are_as_bright_at_every_unit() {
     assert!((asked / assumed - 1.0).abs() < 1e-5, "{assumed} {asked}");
 }
 
+/// Mitsuba 3.9 warns of it and makes a sphere of the scale of x.
+#[test]
+fn a_sphere_that_is_scaled_unevenly_is_told() {
+    let scaled = |scale: &str| {
+        scene(&format!(r#"<shape type="sphere"><transform name="to_world"><scale {scale}/></transform></shape>"#))
+    };
+    assert!(has_note(&scaled(r#"x="1" y="3" z="2""#), "an ellipsoid"));
+    assert!(!has_note(&scaled(r#"value="2""#), "an ellipsoid"));
+}
+
 #[test]
 fn bsdfs_inside_others_keep_their_order() {
     let dark = r#"<bsdf type="diffuse"><rgb name="reflectance" value="0.1"/></bsdf>"#;

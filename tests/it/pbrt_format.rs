@@ -1,6 +1,6 @@
 //! What pbrt's files mean.
 
-use crate::support::write_and_load;
+use crate::support::{has_note, write_and_load};
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Alpha, FilmDefaults, Projection, Scene, ScreenWindow, Surface};
 use fechner_perception::eotf::srgb_to_linear;
@@ -38,6 +38,19 @@ fn inner_attributes_win_and_wrong_ones_are_refused() {
     assert_eq!(scene("", inner).spheres[0].radius, 2.0);
     let wrong = try_load(folder().path(), "", r#"Attribute "shapes" "float radius" 2"#).unwrap_err();
     assert!(wrong.contains(r#"scene.pbrt:2: Attribute "shapes"; did you mean "shape"?"#), "{wrong}");
+}
+
+/// Dropped without a word, the picture was brighter than pbrt's.
+#[test]
+fn a_film_that_limits_samples_is_told() {
+    let folder = folder();
+    let load = |limit: &str| {
+        let text =
+            format!("Camera \"perspective\" Film \"rgb\" {limit} WorldBegin LightSource \"infinite\"\n{SQUARE}\n");
+        write_and_load(&folder.path().join("scene.pbrt"), text).unwrap_or_else(|error| panic!("{error}"))
+    };
+    assert!(has_note(&load(r#""float maxcomponentvalue" 10"#), "--clamp 10 "));
+    assert!(!has_note(&load(""), "maxcomponentvalue"));
 }
 
 /// pbrt knows four colour spaces; of those that are not ours a note tells.

@@ -145,6 +145,16 @@ fn infinity_is_the_largest_half_and_what_is_no_number_is_nothing() {
     assert_eq!(bright.environment.as_ref().unwrap().texels.last(), Some(&Vec3::new(1e6, 0.0, 0.0)));
 }
 
+/// It became black without a word. A colour outside Rec.709 is light for all its negative channels.
+#[test]
+fn light_below_zero_is_told() {
+    let negative = scene(&[("R", [-1.0, 1.0, 1.0, -0.5]), ("G", [-1.0, 1.0, -0.1, -0.5]), ("B", [0.5; 4])], None);
+    let said = "p.exr: luminance below 0 in 2 pixels was replaced by black.";
+    assert_eq!(notes(&negative, said), 2, "{:?}", negative.notes);
+    let wide = scene(&even(&[("R", 0.0), ("G", 1.0), ("B", 0.0)]), Some(REC2020));
+    assert_eq!(notes(&wide, "luminance below 0"), 0, "{:?}", wide.notes);
+}
+
 #[test]
 fn a_picture_without_blue_has_none() {
     let yellow = scene(&even(&[("R", 0.1), ("G", 0.2)]), None);

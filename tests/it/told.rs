@@ -23,6 +23,49 @@ fn motion_that_is_no_number_is_told() {
     }
 }
 
+/// Motion to the frame before alone was refused by a message that had it among those that are known.
+#[test]
+fn motion_to_the_frame_before_alone_is_heeded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "a.exr", |_| [50.0; 3]);
+    let motion = |name: &str, channels: [&str; 2]| {
+        let mut picture = Picture::new(SIDE as u32, SIDE as u32);
+        channels.iter().zip([3.0, 1.0]).for_each(|(name, value)| picture.push_f32(name, vec![value; SIDE * SIDE]));
+        write_exr(&folder.path().join(name), &picture).expect("written");
+        let threshold = ["threshold", "a.exr", "-o", "t.exr", "--velocity", name];
+        let said = run(folder.path(), &threshold);
+        let seen = read_exr(&folder.path().join("t.exr")).expect("read");
+        (seen.channel("threshold.Y").expect("thresholds").to_vec(), said)
+    };
+    let (forward, said) = motion("forward.exr", ["velocity.X", "velocity.Y"]);
+    assert!(!said.contains("before alone"), "{said}");
+    for channels in [["backward.u", "backward.v"], ["velocity_previous.X", "velocity_previous.Y"]] {
+        let (backward, said) = motion("before.exr", channels);
+        assert_eq!(backward, forward, "as fast the other way");
+        assert!(said.contains("note: before.exr: it has motion to the frame before alone"), "{said}");
+        let layer = channels[0].split('.').next().expect("a layer");
+        assert!(said.contains(&format!("motion from the channels of {layer} at")), "{said}");
+    }
+}
+
+/// It became black without a word.
+#[test]
+fn light_below_zero_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "a.exr", |pixel| if pixel < 3 { [-5.0; 3] } else { [50.0, 50.0, -5.0] });
+    write(folder.path(), "wide.exr", |_| [50.0, 50.0, -5.0]);
+    let said = "note: a.exr: luminance below 0 in 3 pixels was replaced by black";
+    for arguments in [
+        &["threshold", "a.exr", "-o", "t.exr"][..],
+        &["tonemap", "a.exr", "-o", "t.png", "--operator", "agx"],
+        &["compare", "wide.exr", "a.exr"],
+    ] {
+        let (_, words) = fechner(folder.path(), arguments);
+        assert_eq!(words.matches("luminance below 0").count(), 1, "{words}");
+        assert!(words.contains(said), "{words}");
+    }
+}
+
 /// Frames of one sequence have one shape.
 #[test]
 fn pixels_that_change_their_shape_are_no_sequence() {

@@ -242,6 +242,12 @@ fn what_makes_no_sense_is_refused_in_one_line() {
     refused(&["a.exr", "a.exr", "-o", "b.png", "--operator", "ptyg"], "one run of #");
     refused(&["a.exr", "a.exr", "-o", "b.#.png", "--operator", "agx"], "does not know an eye that adapts");
     refused(&["a.exr", "-o", "b.png", "--operator", "ptyg", "--gaze", "64,3"], "outside");
+    // Once an operator was named for it, it was refused all the same.
+    let codes = folder.path().join("codes.png");
+    image::RgbImage::from_pixel(2, 2, image::Rgb([9, 99, 200])).save(&codes).expect("written");
+    for asked in [&[][..], &["--exposure", "1"], &["--operator", "agx"], &["--operator", "all"]] {
+        refused(&[&["codes.png", "-o", "b.png"], asked].concat(), "codes.png: ready for a display already");
+    }
     refused(&["a.exr", "-o", "./a.exr", "--operator", "agx"], "would replace a picture that is read");
     refused(&["a.exr", "-o", "b.exr", "--operator", "all"], "end the name in .png");
     refused(

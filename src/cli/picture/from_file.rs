@@ -4,7 +4,7 @@ use super::{Codes, Content, InputPicture};
 use crate::cli::channels::{self, Colour};
 use crate::cli::kept_tone::{self, KeptTone};
 use anyhow::{Context, Result, bail};
-use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES};
+use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, negative_light};
 use fechner::hdr_read::{self, HdrHeader, with_known_header};
 use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
@@ -65,11 +65,10 @@ impl InputPicture {
 
     fn read_in(source: Source<'_>, unit: Unit) -> Result<Self> {
         let path = source.path;
-        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        match ending.as_deref() {
+        match ending_of(path).as_deref() {
             Some("exr") => Self::from_exr(source, &channels::read_picture(path)?, unit),
             Some("hdr") => Self::from_hdr(source, unit.in_cd_m2(source, || None)?),
-            Some("png" | "jpg" | "jpeg") => Self::from_codes(source),
+            _ if is_of_codes(path) => Self::from_codes(source),
             _ => bail!("{}: not a picture that can be judged: .exr, .hdr, .png and .jpg are read", path.display()),
         }
     }
@@ -85,6 +84,9 @@ impl InputPicture {
         };
         for text in channels::guess(exr).iter().chain(&picture.notes).chain(&kept_tone::display_not_read(exr)) {
             source.note(text);
+        }
+        if let Unit::OfLight(_) = unit {
+            negative_light(&picture.rgb).iter().for_each(|text| source.note(text));
         }
         let kept_tone = KeptTone::of(exr);
         let content = match kept_tone {
@@ -163,6 +165,16 @@ impl InputPicture {
             part_of: None,
         }
     }
+}
+
+/// Whether a file of this name holds what is sent to a display: what values mean goes by their file's name.
+pub(in crate::cli) fn is_of_codes(path: &Path) -> bool {
+    matches!(ending_of(path).as_deref(), Some("png" | "jpg" | "jpeg"))
+}
+
+/// In lower case.
+fn ending_of(path: &Path) -> Option<String> {
+    path.extension()?.to_str().map(str::to_ascii_lowercase)
 }
 
 fn bytes_a_channel(image: &DynamicImage) -> u8 {

@@ -43,7 +43,7 @@ impl Motion {
 /// Motion in pixels to the next frame and to the previous one, under the names that renderers give it.
 pub(super) fn velocity_in(path: &Path, exr: &ExrImage, frames_per_second: f64) -> Result<FrameMotion> {
     let motion = channels::motion_planes(path, exr)?;
-    if let Some((layer, _)) = channels::motion(exr) {
+    if let Some(layer) = channels::motion_layer(exr) {
         answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
     }
     Ok(motion)

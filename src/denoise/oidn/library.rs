@@ -51,7 +51,7 @@ struct Functions {
 unsafe impl Send for Device {}
 
 /// Columns and rows of a picture, which is row-major.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Size {
     pub(super) width: usize,
     pub(super) height: usize,

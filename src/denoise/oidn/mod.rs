@@ -4,11 +4,13 @@
 //! own weights, HDR, guided by albedo and normal.
 
 mod find;
+mod frame;
 mod library;
 
 use super::{NoisyPicture, SurfaceGuides};
 use crate::poison::Unpoisoned as _;
 use find::{Environment, candidates};
+use frame::Frame;
 use library::{Device, Guide, Size};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -111,25 +113,31 @@ impl Oidn {
         if guides.samples_of_picture >= CLEAN_ENOUGH_SAMPLES {
             return Ok(guides);
         }
-        let (device, size) = (self.device(), Size { width: guides.width, height: guides.height });
-        Ok(SurfaceGuides {
-            albedo: device.denoise_alone(Guide::Albedo, size, &guides.albedo)?,
-            normal: device.denoise_alone(Guide::Normal, size, &guides.normal)?,
-            ..guides
-        })
+        let (device, frame) = (self.device(), Frame::around(size_of(&guides)));
+        let denoised = |guide, values: &[[f32; 3]]| {
+            device.denoise_alone(guide, frame.size(), &frame.put_around(values)).map(|values| frame.cut_off(values))
+        };
+        let (albedo, normal) = (denoised(Guide::Albedo, &guides.albedo)?, denoised(Guide::Normal, &guides.normal)?);
+        Ok(SurfaceGuides { albedo, normal, ..guides })
     }
 
     /// Denoises a picture of non-negative radiance, any unit.
     pub(super) fn denoise(&self, picture: &NoisyPicture<'_>) -> Result<Vec<[f32; 3]>, OidnError> {
         let guides = picture.guides.get();
-        let size = Size { width: guides.width, height: guides.height };
-        self.device().denoise(size, picture.rgb, &guides.albedo, &guides.normal)
+        let frame = Frame::around(size_of(guides));
+        let [rgb, albedo, normal] =
+            [picture.rgb, &guides.albedo, &guides.normal].map(|values| frame.put_around(values));
+        Ok(frame.cut_off(self.device().denoise(frame.size(), &rgb, &albedo, &normal)?))
     }
 
     fn device(&self) -> MutexGuard<'_, Device> {
         // A lock is poisoned by a panic of another thread between two calls; the device is whole.
         self.device.lock().unpoisoned()
     }
+}
+
+fn size_of(guides: &SurfaceGuides) -> Size {
+    Size { width: guides.width, height: guides.height }
 }
 
 fn in_words(version: i32) -> String {

@@ -232,6 +232,11 @@ impl Reader {
         let facing = facing.turned_over_if(mirrors(to_world) && self.has_front(material));
         let placed = to_world.transform_point3(center);
         let scaled = shapes::similarity_scale(to_world).map(|scale| radius * scale);
+        if scaled.is_none() {
+            let place = shape.place();
+            self.builder
+                .note(format!("{place}: an ellipsoid, as its to_world says; Mitsuba warns and scales it by x alone."));
+        }
         match scaled.filter(|radius| *radius > 0.0 && radius.is_finite() && placed.is_finite()) {
             Some(radius) if facing == Facing::AsMade && self.current_group.is_none() => {
                 self.builder.spheres.push(Sphere {

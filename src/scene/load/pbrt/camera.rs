@@ -243,14 +243,13 @@ impl Reader<'_> {
         {
             self.builder.note("The sensor's own colour response and white balance are not rendered, its exposure is.");
         }
+        if let Some(most) = film.float("maxcomponentvalue")?.filter(|most| most.is_finite()) {
+            self.builder.note(format!("The film's \"maxcomponentvalue\" limits no samples here: --clamp {most} does."));
+        }
         let ratio = seconds * film.float_or("iso", 100.0)? / 100.0;
-        for (type_, name) in [
-            ("string", "filename"),
-            ("float", "diagonal"),
-            ("bool", "savefp16"),
-            ("float", "maxcomponentvalue"),
-            ("string", "coordinatesystem"),
-        ] {
+        for (type_, name) in
+            [("string", "filename"), ("float", "diagonal"), ("bool", "savefp16"), ("string", "coordinatesystem")]
+        {
             film.find(&[type_], name);
         }
         self.note_unread("film", &film);

@@ -3,7 +3,7 @@
 
 use super::Picture;
 use crate::exr_read::layers::colour_layer;
-use crate::exr_read::{self, ExrImage, Replaced, Window, layer_and_part};
+use crate::exr_read::{self, ExrImage, Replaced, Window, layer_and_part, negative_light};
 use crate::hdr_read::{self, HdrHeader, with_known_header};
 use crate::jpeg_read;
 use crate::read_file;
@@ -157,6 +157,7 @@ pub(in crate::scene::load) fn decode_bytes(
             notes.extend(hdr_read::notes(bytes));
             let mut texels = linear_floats(image, encoding, header, &mut notes);
             if values == Values::Colours {
+                notes.extend(negative_light(texels.iter().map(|[rgb @ .., _]| rgb)));
                 texels.iter_mut().for_each(|[rgb @ .., _]| *rgb = gamut::light(*rgb));
             }
             Texels::Floats(Arc::new(texels))
@@ -235,6 +236,7 @@ fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, Load
             .ok_or_else(|| LoadError::unsupported(name, "the picture has neither a channel R nor a channel Y"))?,
     };
     if values == Values::Colours {
+        notes.extend(negative_light(&rgb));
         rgb.iter_mut().for_each(|rgb| *rgb = gamut::light(*rgb));
     }
     let alpha = channel(&image, "A");
