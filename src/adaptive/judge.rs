@@ -86,7 +86,7 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     judge_by(settings.denoiser.as_ref(), film, settings, inflation, Purpose::Report)
 }
 
-/// The same with all that a plan is made of, for a sixth more of a raw look's price.
+/// The same with all that a plan is made of, which makes a raw look dearer.
 ///
 /// # Errors
 /// As [`judge`].

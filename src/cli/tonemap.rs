@@ -172,7 +172,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     }
     let format = output::check_target(&targets[0])?;
     // Before an operator is asked for, by which no such file could be shown either.
-    if let Some(path) = arguments.input.iter().find(|path| is_of_codes(path)) {
+    if let Some(path) = arguments.input.iter().find(|path| is_of_codes(path) && path.exists()) {
         bail!(is_ready(path));
     }
     let Some(operator) = arguments.operator.as_deref() else {

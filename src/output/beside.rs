@@ -152,14 +152,15 @@ pub fn check_name(path: &Path) -> Result<(), OutputError> {
     let Some(name) = target.file_name() else { return Ok(()) };
     let folder = folder_of(&target).ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
     match folder.join(name).symlink_metadata() {
-        Err(error) if error.kind() == std::io::ErrorKind::InvalidFilename => {
+        // Of a path that is too long as a whole the system says so itself.
+        Err(error) if error.kind() == std::io::ErrorKind::InvalidFilename && name.len() > LONGEST_NAME => {
             Err(OutputError::LongName { path: path.to_owned(), bytes: name.len() })
         }
         _ => Ok(()),
     }
 }
 
-/// A name that every file system takes: of one that is too long the end gives way, but for its ending.
+/// A name that common file systems take: of one that is too long the end gives way, but for its ending.
 pub fn shortened_name(name: &OsStr) -> OsString {
     if name.len() <= LONGEST_NAME {
         return name.to_owned();

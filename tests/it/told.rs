@@ -28,19 +28,21 @@ fn motion_that_is_no_number_is_told() {
 fn motion_to_the_frame_before_alone_is_heeded() {
     let folder = tempfile::tempdir().expect("a folder");
     write(folder.path(), "a.exr", |_| [50.0; 3]);
-    let motion = |name: &str, channels: [&str; 2]| {
+    let motion = |name: &str, channels: [&str; 2], pixels_a_frame: [f32; 2]| {
         let mut picture = Picture::new(SIDE as u32, SIDE as u32);
-        channels.iter().zip([3.0, 1.0]).for_each(|(name, value)| picture.push_f32(name, vec![value; SIDE * SIDE]));
+        channels.iter().zip(pixels_a_frame).for_each(|(name, value)| picture.push_f32(name, vec![value; SIDE * SIDE]));
         write_exr(&folder.path().join(name), &picture).expect("written");
         let threshold = ["threshold", "a.exr", "-o", "t.exr", "--velocity", name];
         let said = run(folder.path(), &threshold);
         let seen = read_exr(&folder.path().join("t.exr")).expect("read");
         (seen.channel("threshold.Y").expect("thresholds").to_vec(), said)
     };
-    let (forward, said) = motion("forward.exr", ["velocity.X", "velocity.Y"]);
+    let (forward, said) = motion("forward.exr", ["velocity.X", "velocity.Y"], [3.0, 1.0]);
     assert!(!said.contains("before alone"), "{said}");
+    let (still, _) = motion("still.exr", ["velocity.X", "velocity.Y"], [0.0; 2]);
+    assert_ne!(forward, still, "what moves is seen otherwise than what rests");
     for channels in [["backward.u", "backward.v"], ["velocity_previous.X", "velocity_previous.Y"]] {
-        let (backward, said) = motion("before.exr", channels);
+        let (backward, said) = motion("before.exr", channels, [3.0, 1.0]);
         assert_eq!(backward, forward, "as fast the other way");
         assert!(said.contains("note: before.exr: it has motion to the frame before alone"), "{said}");
         let layer = channels[0].split('.').next().expect("a layer");

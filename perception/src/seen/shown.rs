@@ -135,6 +135,9 @@ impl NoisyPixel<'_> {
     /// leaves for a tint. `room_cd_m2`: of black. Nothing is taken off where few samples bring the light: of a caustic at 2.5 times white most
     /// pixels are below it, and three points that say one in five left a third of what showed.
     pub(super) fn within_room(&self, unbounded: f32, room_cd_m2: f64) -> f32 {
+        if !self.shown.fitted.is_white_at_white() {
+            return unbounded;
+        }
         let unbounded = f64::from(unbounded);
         let fits = |relative: f32| {
             let room = f64::from((1.0 - relative).max(0.0)) * room_cd_m2;

@@ -161,6 +161,10 @@ impl FittedTone for FittedAgx {
         tint_slope(self, pixel, scene_cd_m2)
     }
 
+    fn is_white_at_white(&self) -> bool {
+        false
+    }
+
     fn describe(&self) -> String {
         format!("agx: middle grey at {} cd/m² of the scene", Shown(MIDDLE_GREY / self.relative_per_cd_m2))
     }

@@ -71,6 +71,10 @@ impl FittedTone for FittedClip {
         light(rgb_cd_m2).map(|channel| self.relative_luminance_at(pixel, channel).min(1.0))
     }
 
+    fn is_white_at_white(&self) -> bool {
+        false
+    }
+
     fn describe(&self) -> String {
         format!("{}: clips at {} cd/m² of the scene", self.operator, Shown(self.relative_per_cd_m2.recip()))
     }

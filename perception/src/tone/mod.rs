@@ -175,6 +175,12 @@ pub trait FittedTone: Send + Sync + Debug {
         self.relative_luminance_at(pixel, luminance).min(1.0) / luminance
     }
 
+    /// Whether every colour is shown as white whose luminance the operator takes to white or beyond. Not where it bends or clips each
+    /// channel by itself: a blue of any luminance stays blue.
+    fn is_white_at_white(&self) -> bool {
+        true
+    }
+
     /// The loss of fine detail that the operator simulates. It mixes pixels: scene light goes through it before
     /// [`map_rgb_at`](FittedTone::map_rgb_at), and so does noise ([`AcuityFilter::transfer`]).
     fn acuity(&self) -> Option<AcuityFilter> {

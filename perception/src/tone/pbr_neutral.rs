@@ -74,6 +74,10 @@ impl FittedTone for FittedPbrNeutral {
         tint_slope(self, pixel, scene_cd_m2)
     }
 
+    fn is_white_at_white(&self) -> bool {
+        false
+    }
+
     fn describe(&self) -> String {
         format!("pbr-neutral: 1 at {} cd/m² of the scene", Shown(self.relative_per_cd_m2.recip()))
     }

@@ -42,7 +42,7 @@ impl OverWhite {
         let ground_cd_m2 = white_cd_m2 - display.luminance_cd_m2(0.0);
         let no_colour = Plane::filled(guide_before_black.width(), guide_before_black.height(), 0.0);
         let over = film.over_ground(colour_scale.unwrap_or(&no_colour).values(), ground_cd_m2);
-        let scatter = Scatter::of_displayed(&over);
+        let scatter = Scatter::of_display_light(&over);
         let displayed_guide = guide_before_black.combined(&guide_coverage(film), |light, coverage| {
             (light + (1.0 - coverage) * ground_cd_m2 as f32).min((white_cd_m2 as f32).max(light))
         });

@@ -91,7 +91,7 @@ impl Scatter {
     }
 
     /// Of a film that holds what is displayed.
-    pub(super) fn of_displayed(film: &Film) -> Self {
+    pub(super) fn of_display_light(film: &Film) -> Self {
         let scales = scene_units(film);
         let statistics = SampleStatistics::of(film, &scales);
         let chromatic_slope = Plane::filled(film.width() as usize, film.height() as usize, 1.0);
@@ -116,7 +116,7 @@ impl Scatter {
     /// Displayed over scene variance by channel for what each half decides by: of the other half's light and noise. Where both halves' went
     /// in, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
     /// tube of light made a picture 2.75 % too bright (`benches/results/sampling.md`, lamps on black, dust and wires). Of both are still which pixels shine, how
-    /// many samples there are, the hues of the guide, and what is seen over white. `lights`: of the halves.
+    /// many samples there are, the guide's hues and what the operator leaves of tints on it, and what is seen over white. `lights`: of the halves.
     pub(super) fn scales_of_halves(
         &self,
         film: &Film,

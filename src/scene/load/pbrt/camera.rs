@@ -244,7 +244,9 @@ impl Reader<'_> {
             self.builder.note("The sensor's own colour response and white balance are not rendered, its exposure is.");
         }
         if let Some(most) = film.float("maxcomponentvalue")?.filter(|most| most.is_finite()) {
-            self.builder.note(format!("The film's \"maxcomponentvalue\" limits no samples here: --clamp {most} does."));
+            self.builder.note(format!(
+                "The film's \"maxcomponentvalue\" limits no samples here: --clamp {most} does much the same."
+            ));
         }
         let ratio = seconds * film.float_or("iso", 100.0)? / 100.0;
         for (type_, name) in
