@@ -85,9 +85,9 @@ pub struct SceneColours<'a> {
 
 /// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², for those of the scene, `scene` ((cd/m²)², of the
 /// mean), on scene luminance `mean` (cd/m²): of luminance as [`display_variance`]; of colour the greater of two. One is what the operator
-/// leaves of tints, as far as there is room for them below the display's white, where every colour becomes white
-/// by most operators ([`FittedTone::is_white_at_white`]); nothing is taken off at black, whose tints are small by themselves. The other is what becomes of
-/// `colours` that fit the display less, the brighter they are: red at half of white's luminance pales with each step towards it.
+/// leaves of tints, as far as there is room for them below the display's white, where most operators make every colour white
+/// ([`FittedTone::is_white_at_white`]); nothing is taken off at black, whose tints are small by themselves. The other is what becomes
+/// of `colours` that fit the display less, the brighter they are: red at half of white's luminance pales with each step towards it.
 ///
 /// Pixels that are not finite, or of negative variance, get infinity; of colour also where luminance's variance is so. So does every
 /// pixel when the planes differ in size.
@@ -119,13 +119,14 @@ pub fn display_opponent_variances(
             }
             let noise = Noise { mean: f64::from(mean.max(0.0)), variance: f64::from(luminance) };
             let pixel = shown.pixel(Pixel { x: index % width, y: index / width }, noise);
+            let slope = at(colours.chromatic_slope);
+            let of_scene = [red_green, yellow_violet];
+            let tints = pixel.within_rooms(of_scene.map(|variance| slope * slope * variance), rooms_cd_m2);
             let paling = pixel.variances_of_paling(colours.rgb[index]);
-            let of_colour = |variance: f32, channel: usize| {
-                let unbounded = at(colours.chromatic_slope).powi(2) * variance;
-                let tint = || pixel.within_room(unbounded, rooms_cd_m2[channel]).max(paling[channel]);
-                if is_variance(variance) { tint() } else { f32::INFINITY }
+            let of_colour = |signal: usize| {
+                if is_variance(of_scene[signal]) { tints[signal].max(paling[signal]) } else { f32::INFINITY }
             };
-            [pixel.variance(), of_colour(red_green, 0), of_colour(yellow_violet, 1)]
+            [pixel.variance(), of_colour(0), of_colour(1)]
                 .map(|variance| if variance.is_finite() { variance } else { f32::INFINITY })
         })
         .collect();

@@ -40,12 +40,12 @@ pub struct SampleStatistics {
     pub channels: [ChannelStatistics; CHANNELS],
 }
 
-/// What the halves differ by in a channel as they are displayed, (cd/m²)².
+/// What the halves differ by as they are displayed, by channel, (cd/m²)².
 pub struct DifferenceOnDisplay {
     /// Square of half of it.
-    pub squared: Plane,
+    pub squared: [Plane; CHANNELS],
     /// What that would be of independent samples which scatter as they are taken to.
-    pub expected: Plane,
+    pub expected: [Plane; CHANNELS],
 }
 
 impl SampleStatistics {
@@ -57,11 +57,12 @@ impl SampleStatistics {
 
     /// The same, with the halves' differences as the display shows them. Of what is mostly beyond white, variance times a scale tells up to 7
     /// times the noise that is seen (`benches/results/sampling.md`, what moves the mean).
-    pub fn of_displayed(film: &Film, scale: &[Plane; CHANNELS], differences: &[DifferenceOnDisplay; CHANNELS]) -> Self {
+    pub fn of_displayed(film: &Film, scale: &[Plane; CHANNELS], difference: &DifferenceOnDisplay) -> Self {
+        let DifferenceOnDisplay { squared, expected } = difference;
         Self::by(film, scale, |pixel, mut evidence| {
-            for (evidence, difference) in evidence.iter_mut().zip(differences) {
-                evidence.squared_difference = f64::from(difference.squared.values()[pixel]);
-                evidence.expected_difference = f64::from(difference.expected.values()[pixel]);
+            for (evidence, (squared, expected)) in evidence.iter_mut().zip(squared.iter().zip(expected)) {
+                evidence.squared_difference = f64::from(squared.values()[pixel]);
+                evidence.expected_difference = f64::from(expected.values()[pixel]);
             }
             evidence
         })

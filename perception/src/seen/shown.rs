@@ -96,6 +96,13 @@ impl Points {
     }
 }
 
+/// Variance of values by what they weigh.
+fn variance_of(weighted: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+    let total: f64 = weighted.clone().map(|(weight, _)| weight).sum();
+    let mean = weighted.clone().map(|(weight, value)| weight * value).sum::<f64>() / total;
+    weighted.map(|(weight, value)| weight * (value - mean) * (value - mean)).sum::<f64>() / total
+}
+
 /// A pixel with noisy light behind operator and display.
 pub(super) struct NoisyPixel<'a> {
     shown: &'a Shown<'a>,
@@ -119,46 +126,40 @@ impl NoisyPixel<'_> {
         if self.noise.is_normal() && self.clip_is_in_reach(points.relative) {
             return self.clipped_variance();
         }
-        let [weight_below, _, weight_above] = points.weights(self.noise);
-        let [low, center, high] = points.relative.map(|relative| f64::from(self.shown.emitted_cd_m2(relative)));
-        let (low, high) = (low - center, high - center);
-        let offset = weight_below * low + weight_above * high;
-        let spread = (weight_below * low * low + weight_above * high * high - offset * offset).max(0.0);
+        let shown = points.relative.map(|relative| f64::from(self.shown.emitted_cd_m2(relative)));
+        let spread = variance_of(points.weights(self.noise).into_iter().zip(shown));
         if self.noise.is_normal() {
             return spread as f32;
         }
-        let swing = self.cd_m2(mean + variance.sqrt()) - center;
+        let swing = self.cd_m2(mean + variance.sqrt()) - shown[1];
         (0.5 * (spread + swing * swing)) as f32
     }
 
-    /// How much of a chromatic variance, `unbounded` (cd/m²)², fits the display: at most the square of the room that each luminance
-    /// leaves for a tint. `room_cd_m2`: of black. Nothing is taken off where few samples bring the light: of a caustic at 2.5 times white most
-    /// pixels are below it, and three points that say one in five left a third of what showed.
-    pub(super) fn within_room(&self, unbounded: f32, room_cd_m2: f64) -> f32 {
-        if !self.shown.fitted.is_white_at_white() {
+    /// How much of the variances of both chromatic signals, `unbounded` (cd/m²)², fits the display: at most the square of the room that each
+    /// luminance leaves for a tint. `rooms_cd_m2`: of black. Nothing is taken off where few samples bring the light: of a caustic at 2.5 times
+    /// white most pixels are below it, and three points that say one in five left a third of what showed.
+    pub(super) fn within_rooms(&self, unbounded: [f32; 2], rooms_cd_m2: [f64; 2]) -> [f32; 2] {
+        let fits = |relative: f32| -> [f64; 2] {
+            let share = f64::from((1.0 - relative).max(0.0));
+            std::array::from_fn(|signal| f64::from(unbounded[signal]).min((share * rooms_cd_m2[signal]).powi(2)))
+        };
+        let at_one = |relative: f32| fits(relative).map(|variance| variance as f32);
+        let is_bright = match &self.points {
+            Some(points) => self.noise.is_normal() && at_one(points.relative[2]) != unbounded,
+            None => self.noise.variance <= 0.0,
+        };
+        if !is_bright || !self.shown.fitted.is_white_at_white() {
             return unbounded;
         }
-        let unbounded = f64::from(unbounded);
-        let fits = |relative: f32| {
-            let room = f64::from((1.0 - relative).max(0.0)) * room_cd_m2;
-            unbounded.min(room * room)
-        };
-        let Some(points) = &self.points else {
-            return if self.noise.variance <= 0.0 {
-                fits(self.relative(self.noise.mean)) as f32
-            } else {
-                unbounded as f32
-            };
-        };
-        if !self.noise.is_normal() || fits(points.relative[2]) >= unbounded {
-            return unbounded as f32;
+        if self.points.is_none() {
+            return at_one(self.relative(self.noise.mean));
         }
-        let (mut weights, mut sum) = (0.0, 0.0);
+        let (mut weights, mut sums) = (0.0, [0.0; 2]);
         for (scene, weight) in self.normal_points() {
             weights += weight;
-            sum += weight * fits(self.relative(scene));
+            sums.iter_mut().zip(fits(self.relative(scene))).for_each(|(sum, fits)| *sum += weight * fits);
         }
-        (sum / weights) as f32
+        sums.map(|sum| (sum / weights) as f32)
     }
 
     /// Variances of red–green and yellow–violet as displayed, (cd/m²)², where noise of luminance brightens and darkens a colour, linear
@@ -175,13 +176,9 @@ impl NoisyPixel<'_> {
             let scale = (scene / f64::from(strength)) as f32;
             self.shown.opponent(self.pixel, rgb.map(|channel| channel * scale))
         });
-        let weights = points.weights(self.noise);
         let variance = |signal: fn(&Opponent) -> f32| {
-            let signals = shown.each_ref().map(|shown| f64::from(signal(shown)));
-            let moment = |power: i32| {
-                weights.iter().zip(signals).map(|(weight, signal)| weight * signal.powi(power)).sum::<f64>()
-            };
-            (moment(2) - moment(1).powi(2)).max(0.0) as f32
+            let signals = shown.iter().map(|shown| f64::from(signal(shown)));
+            variance_of(points.weights(self.noise).into_iter().zip(signals)) as f32
         };
         [variance(|shown| shown.red_green), variance(|shown| shown.yellow_violet)]
     }
@@ -206,19 +203,11 @@ impl NoisyPixel<'_> {
 
     /// Variance as displayed of normal noise.
     fn clipped_variance(&self) -> f32 {
-        let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
-        let center = self.cd_m2(self.noise.mean);
-        for (scene, weight) in self.normal_points() {
-            let shown = self.cd_m2(scene) - center;
-            weights += weight;
-            sum += weight * shown;
-            squares += weight * shown * shown;
-        }
-        (squares / weights - (sum / weights).powi(2)).max(0.0) as f32
+        variance_of(self.normal_points().map(|(scene, weight)| (weight, self.cd_m2(scene)))) as f32
     }
 
     /// Luminances of normal noise, cd/m², and what they weigh: the midpoint rule. No light is below 0, which who asks has to see to.
-    fn normal_points(&self) -> impl Iterator<Item = (f64, f64)> {
+    fn normal_points(&self) -> impl Iterator<Item = (f64, f64)> + Clone {
         const STEPS: i32 = 10;
         let (mean, deviation) = (self.noise.mean, self.noise.deviation());
         (-STEPS..=STEPS).map(move |step| {

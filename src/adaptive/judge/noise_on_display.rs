@@ -36,9 +36,11 @@ impl NoiseOnDisplay<'_> {
     /// Displayed over scene variance by channel about a luminance, cd/m². `variance`: of one sample of a pixel in a channel, in scene
     /// units.
     pub(super) fn scales(&self, light: &Plane, variance: impl Fn(usize, usize) -> f64 + Sync) -> [Plane; CHANNELS] {
+        let scene = self.of_mean(light, variance);
+        let shown = self.displayed(light, &scene);
         let nits_squared = self.nits_squared();
-        self.displayed(light, variance).map(|Displayed { scene, shown }| {
-            scene.combined(&shown, |scene, shown| {
+        by_channel(|c| {
+            scene[c].combined(&shown[c], |scene, shown| {
                 let (scene, shown) = (f64::from(scene), f64::from(shown));
                 match shown / scene * nits_squared {
                     _ if scene == 0.0 => 0.0,
@@ -54,27 +56,22 @@ impl NoiseOnDisplay<'_> {
         self.settings.nits_per_unit * self.settings.nits_per_unit * self.inflation
     }
 
-    /// Variance of the mean by channel about a luminance. Arguments as of [`Self::scales`].
-    fn displayed(&self, light: &Plane, variance: impl Fn(usize, usize) -> f64 + Sync) -> [Displayed; CHANNELS] {
+    /// Variance of the mean by channel, (cd/m²)² of the scene. Arguments as of [`Self::scales`].
+    fn of_mean(&self, light: &Plane, variance: impl Fn(usize, usize) -> f64 + Sync) -> [Plane; CHANNELS] {
         let nits_squared = self.nits_squared();
-        let display = &self.settings.viewing.display;
-        let scene = by_channel(|c| {
+        by_channel(|c| {
             Plane::from_fn(light.width(), light.height(), |x, y| {
                 let of_mean = variance(y * light.width() + x, c) * f64::from(self.shares.get(x, y));
                 (of_mean * nits_squared) as f32
             })
-        });
-        let shown = seen::display_opponent_variances(self.tone, display, light, self.colours, scene.each_ref());
-        let mut shown = shown.into_iter();
-        scene.map(|scene| Displayed { scene, shown: shown.next().expect("a channel's") })
+        })
     }
-}
 
-/// A channel's variance, (cd/m²)².
-struct Displayed {
-    scene: Plane,
-    /// On the display.
-    shown: Plane,
+    /// What of a variance by channel, (cd/m²)² of the scene, the display shows.
+    fn displayed(&self, light: &Plane, scene: &[Plane; CHANNELS]) -> [Plane; CHANNELS] {
+        let display = &self.settings.viewing.display;
+        seen::display_opponent_variances(self.tone, display, light, self.colours, scene.each_ref())
+    }
 }
 
 /// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display
@@ -104,21 +101,18 @@ pub(super) fn difference_on_display(
     colours: SceneColours<'_>,
     tone: &dyn FittedTone,
     settings: &LoopSettings,
-) -> [DifferenceOnDisplay; CHANNELS] {
+) -> DifferenceOnDisplay {
+    // A half's variance, which is twice the mean's; of a half without samples nothing differs.
     let of_halves = film.plane(|pixel| match film.halves(pixel) {
-        Halves::Both(both) => both.map(|half| 0.5 / half.samples as f32).iter().sum(),
+        Halves::Both(_) => 2.0 * variance_share(film, pixel) as f32,
         Halves::Only(_) => 0.0,
     });
     let noise = NoiseOnDisplay { shares: &of_halves, colours, tone, settings, inflation: 1.0 };
-    let (squared, expected) = rayon::join(
+    let (squared, displayed) = rayon::join(
         || squared_differences(film, guide.width(), tone, settings),
-        || noise.displayed(guide, |pixel, c| film.halves(pixel).sample_variance(c)),
+        || noise.displayed(guide, &noise.of_mean(guide, |pixel, c| film.halves(pixel).sample_variance(c))),
     );
-    let mut both = squared.into_iter().zip(expected);
-    std::array::from_fn(|_| {
-        let (squared, Displayed { shown: expected, .. }) = both.next().expect("a channel's");
-        DifferenceOnDisplay { squared, expected: expected.map(|variance| 0.5 * variance) }
-    })
+    DifferenceOnDisplay { squared, expected: displayed.map(|variance| variance.map(|variance| 0.5 * variance)) }
 }
 
 /// Square of half of what the halves differ by as displayed, by channel, (cd/m²)²; 0 where one of them has no samples.

@@ -82,11 +82,11 @@ impl Scatter {
         let chromatic_slope = seen::display_chromatic_slope(tone, &settings.viewing.display, luminance);
         let colours = SceneColours { rgb: &guide.rgb_cd_m2, chromatic_slope: &chromatic_slope };
         let noise = NoiseOnDisplay { shares: &shares, colours, tone, settings, inflation };
-        let (scales, differences) = rayon::join(
+        let (scales, difference) = rayon::join(
             || noise.scales(luminance, |pixel, c| film.halves(pixel).sample_variance(c)),
             || difference_on_display(film, luminance, colours, tone, settings),
         );
-        let statistics = SampleStatistics::of_displayed(film, &scales, &differences);
+        let statistics = SampleStatistics::of_displayed(film, &scales, &difference);
         Self { shares, chromatic_slope, scales, statistics }
     }
 
