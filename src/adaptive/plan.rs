@@ -281,7 +281,8 @@ fn doublings_for(ratio: f64, dither: f64, most: u32) -> u32 {
     if ratio.is_nan() || ratio <= 1.0 {
         return 0;
     }
-    let whole = ratio.log2().floor().min(f64::from(most)) as u32;
+    // The logarithm's floor, without one.
+    let whole = (1..=most).take_while(|&doublings| ratio >= f64::from(1 << doublings)).count() as u32;
     if whole == most {
         return whole;
     }

@@ -12,7 +12,7 @@ use crate::scene::ViewingDefaults;
 use crate::scene::hash::content_hash;
 use anyhow::Result;
 use fechner_perception::Plane;
-use fechner_perception::tone::{FittedTone, SceneLight};
+use fechner_perception::tone::{FittedTone, SceneLight, coloured};
 use std::sync::OnceLock;
 
 /// Seed of references, far from those of arms.
@@ -101,7 +101,8 @@ impl Reference {
         let settings = subject.loop_settings()?;
         let estimate = film.estimate(settings.nits_per_unit);
         let light = SceneLight::of(settings.operator.as_ref(), film.width() as usize, &estimate.rgb_cd_m2);
-        let tone = settings.operator.fit(&light.guide(), &settings.viewing, None);
+        let fitted = settings.operator.fit(&light.guide(), &settings.viewing, None);
+        let tone = coloured(fitted, film.width() as usize, &estimate.rgb_cd_m2);
         let scale = display_scale(film, &light, &estimate.rgb_cd_m2, tone.as_ref(), &settings);
         Ok(SampleStatistics::of(film, &scale).channels.map(|channel| channel.low_discrepancy_factor))
     }
@@ -123,8 +124,9 @@ impl Reference {
     /// The operator of the arms, fitted to the reference.
     pub(crate) fn fit(&self, subject: &Subject) -> Result<Box<dyn FittedTone>> {
         let settings = subject.loop_settings()?;
-        let light = SceneLight::of(settings.operator.as_ref(), self.width, &self.rgb_cd_m2());
-        Ok(settings.operator.fit(&light.guide(), &subject.viewing, None))
+        let rgb_cd_m2 = self.rgb_cd_m2();
+        let light = SceneLight::of(settings.operator.as_ref(), self.width, &rgb_cd_m2);
+        Ok(coloured(settings.operator.fit(&light.guide(), &subject.viewing, None), self.width, &rgb_cd_m2))
     }
 
     fn to_values(&self) -> Vec<f32> {

@@ -1,6 +1,6 @@
 //! What the halves of a pixel say together: the one place that knows what holds where one of them is empty.
 
-use super::{HalfPixel, opponent};
+use super::{CHANNELS, HalfPixel, opponent};
 use crate::sampler::Half;
 
 /// The halves of a pixel that have samples, of which its picture is the plain mean.
@@ -76,6 +76,11 @@ impl<'a> Halves<'a> {
             }
             Self::Only(only) => only.sample_variance(channel),
         }
+    }
+
+    /// [`Self::sample_variance`] of each channel.
+    pub fn sample_variances(self) -> [f64; CHANNELS] {
+        std::array::from_fn(|channel| self.sample_variance(channel))
     }
 
     /// Variance of the mean in an opponent channel by the samples' own scatter: (s_A²/n_A + s_B²/n_B) / 4, or s²/n where one half has all

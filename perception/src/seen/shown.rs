@@ -4,9 +4,22 @@ use crate::display::Display;
 use crate::opponent::{Opponent, opponent};
 use crate::photometry::luminance;
 use crate::tone::{FittedTone, Pixel};
+use std::sync::LazyLock;
 
 /// Standard deviations from the mean beyond which normal noise is let go: 4 lose 0.1 % of the variance.
 const FARTHEST: f64 = 4.0;
+
+/// Points of normal noise on either side of the mean.
+const STEPS: usize = 10;
+
+/// Deviations of normal noise and what they weigh: the midpoint rule. Once for all pixels, whose exponentials were a twelfth of the time
+/// that noise on the display took.
+static NORMAL_POINTS: LazyLock<[(f64, f64); 2 * STEPS + 1]> = LazyLock::new(|| {
+    std::array::from_fn(|step| {
+        let deviations = FARTHEST * (step as f64 - STEPS as f64) / STEPS as f64;
+        (deviations, (-0.5 * deviations * deviations).exp())
+    })
+});
 
 /// A display behind an operator.
 pub(super) struct Shown<'a> {
@@ -25,18 +38,35 @@ impl Shown<'_> {
     }
 
     pub(super) fn chromatic_slope(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
-        let span_cd_m2 = (self.display.white_cd_m2 - self.display.black_cd_m2) as f32;
-        span_cd_m2 * self.fitted.chromatic_slope_at(pixel, scene_cd_m2)
+        self.span_cd_m2() * self.fitted.chromatic_slope_at(pixel, scene_cd_m2)
     }
 
     pub(super) fn opponent(&self, pixel: Pixel, rgb_cd_m2: [f32; 3]) -> Opponent {
-        let span_cd_m2 = (self.display.white_cd_m2 - self.display.black_cd_m2) as f32;
+        let span_cd_m2 = self.span_cd_m2();
         opponent(self.fitted.map_rgb_at(pixel, rgb_cd_m2).map(|channel| span_cd_m2 * channel))
     }
 
-    /// A pixel with noisy light.
+    fn span_cd_m2(&self) -> f32 {
+        (self.display.white_cd_m2 - self.display.black_cd_m2) as f32
+    }
+
+    /// A pixel with noisy light, grey.
     pub(super) fn pixel(&self, pixel: Pixel, noise: Noise) -> NoisyPixel<'_> {
-        NoisyPixel { shown: self, pixel, noise, points: Points::of(noise, |scene| self.relative(pixel, scene)) }
+        let points = Points::of(noise, |scene| self.relative(pixel, scene));
+        NoisyPixel { shown: self, pixel, noise, hue: None, points }
+    }
+
+    /// The same of a colour, `hue` at a luminance of 1 cd/m², that the operator shows as something else than a grey of its luminance; and what
+    /// its three points show.
+    pub(super) fn coloured_pixel(
+        &self,
+        pixel: Pixel,
+        noise: Noise,
+        hue: [f32; 3],
+    ) -> (NoisyPixel<'_>, Option<Points<Opponent>>) {
+        let shown = Points::of(noise, |scene| self.opponent(pixel, hue.map(|channel| channel * scene as f32)));
+        let points = shown.map(|points| points.map(|shown| shown.achromatic / self.span_cd_m2()));
+        (NoisyPixel { shown: self, pixel, noise, hue: Some(hue), points }, shown)
     }
 
     fn relative(&self, pixel: Pixel, scene_cd_m2: f64) -> f32 {
@@ -70,29 +100,35 @@ impl Noise {
 }
 
 /// Three points that have the mean and the variance of noisy light, and what the operator makes of them.
-struct Points {
+#[derive(Clone, Copy)]
+pub(super) struct Points<T> {
     /// Distances of the outer points from the mean, cd/m². At M = √3 σ both kinds of points agree.
     below: f64,
     above: f64,
     /// Below, at and above the mean.
-    relative: [f32; 3],
+    shown: [T; 3],
 }
 
-impl Points {
+impl<T: Copy> Points<T> {
     /// `None` without noise; or without light on average and yet noise, which only a broken input has.
-    fn of(noise: Noise, relative: impl Fn(f64) -> f32) -> Option<Self> {
+    fn of(noise: Noise, shown: impl Fn(f64) -> T) -> Option<Self> {
         let Noise { mean, variance } = noise;
         let gauss = noise.gauss();
         let (below, above) = if noise.is_normal() { (gauss, gauss) } else { (mean, (3.0 * variance / mean).min(1e30)) };
         let has_points = below > 0.0 && above.is_finite();
-        has_points.then(|| Self { below, above, relative: [mean - below, mean, mean + above].map(relative) })
+        has_points.then(|| Self { below, above, shown: [mean - below, mean, mean + above].map(shown) })
     }
 
-    /// What the points weigh.
-    fn weights(&self, noise: Noise) -> [f64; 3] {
+    fn map<U>(self, to: impl Fn(T) -> U) -> Points<U> {
+        Points { below: self.below, above: self.above, shown: self.shown.map(to) }
+    }
+
+    /// Variance of something that is shown. `noise`: of which these are the points.
+    pub(super) fn variance(&self, noise: Noise, of: impl Fn(T) -> f32) -> f64 {
         let Self { below, above, .. } = *self;
         let outer = [below, above].map(|distance| noise.variance / (distance * (below + above)));
-        [outer[0], 1.0 - outer[0] - outer[1], outer[1]]
+        let weights = [outer[0], 1.0 - outer[0] - outer[1], outer[1]];
+        variance_of(weights.into_iter().zip(self.shown.map(|shown| f64::from(of(shown)))))
     }
 }
 
@@ -103,12 +139,20 @@ fn variance_of(weighted: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
     weighted.map(|(weight, value)| weight * (value - mean) * (value - mean)).sum::<f64>() / total
 }
 
+/// Variances of red–green and yellow–violet, (cd/m²)², of a colour whose luminance is noisy.
+pub(super) fn variances_of_tints(shown: &Points<Opponent>, noise: Noise) -> [f32; 2] {
+    [|shown: Opponent| shown.red_green, |shown: Opponent| shown.yellow_violet]
+        .map(|signal| shown.variance(noise, signal) as f32)
+}
+
 /// A pixel with noisy light behind operator and display.
 pub(super) struct NoisyPixel<'a> {
-    shown: &'a Shown<'a>,
-    pixel: Pixel,
-    noise: Noise,
-    points: Option<Points>,
+    pub(super) shown: &'a Shown<'a>,
+    pub(super) pixel: Pixel,
+    pub(super) noise: Noise,
+    /// At a luminance of 1 cd/m²; a grey's where there is none.
+    hue: Option<[f32; 3]>,
+    points: Option<Points<f32>>,
 }
 
 impl NoisyPixel<'_> {
@@ -123,15 +167,15 @@ impl NoisyPixel<'_> {
             let swing = self.cd_m2(self.noise.gauss()) - self.cd_m2(0.0);
             return (swing * swing / 3.0) as f32;
         };
-        if self.noise.is_normal() && self.clip_is_in_reach(points.relative) {
+        if self.noise.is_normal() && self.clip_is_in_reach(points.shown) {
             return self.clipped_variance();
         }
-        let shown = points.relative.map(|relative| f64::from(self.shown.emitted_cd_m2(relative)));
-        let spread = variance_of(points.weights(self.noise).into_iter().zip(shown));
+        let shown = points.map(|relative| self.shown.emitted_cd_m2(relative));
+        let spread = shown.variance(self.noise, |cd_m2| cd_m2);
         if self.noise.is_normal() {
             return spread as f32;
         }
-        let swing = self.cd_m2(mean + variance.sqrt()) - shown[1];
+        let swing = self.cd_m2(mean + variance.sqrt()) - f64::from(shown.shown[1]);
         (0.5 * (spread + swing * swing)) as f32
     }
 
@@ -145,14 +189,17 @@ impl NoisyPixel<'_> {
         };
         let at_one = |relative: f32| fits(relative).map(|variance| variance as f32);
         let is_bright = match &self.points {
-            Some(points) => self.noise.is_normal() && at_one(points.relative[2]) != unbounded,
+            Some(points) => self.noise.is_normal() && at_one(points.shown[2]) != unbounded,
             None => self.noise.variance <= 0.0,
         };
-        if !is_bright || !self.shown.fitted.is_white_at_white() {
+        if !is_bright {
             return unbounded;
         }
         if self.points.is_none() {
             return at_one(self.relative(self.noise.mean));
+        }
+        if self.is_all_white() {
+            return [0.0; 2];
         }
         let (mut weights, mut sums) = (0.0, [0.0; 2]);
         for (scene, weight) in self.normal_points() {
@@ -163,24 +210,17 @@ impl NoisyPixel<'_> {
     }
 
     /// Variances of red–green and yellow–violet as displayed, (cd/m²)², where noise of luminance brightens and darkens a colour, linear
-    /// Rec. 709 RGB of any strength, that the display then shows paler and less so. 0 where the colour fits the display at all points.
+    /// Rec. 709 RGB of any strength, that the display then shows paler and less so. 0 where the colour fits the display at all points, or is white at
+    /// all of them. By an operator that keeps luminance.
     pub(super) fn variances_of_paling(&self, rgb: [f32; 3]) -> [f32; 2] {
         let strength = luminance(rgb);
         let (Some(points), true) = (&self.points, strength > 0.0 && strength.is_finite()) else { return [0.0; 2] };
         let largest = rgb.into_iter().fold(0.0, f32::max) / strength;
-        if points.relative[2] * largest <= 1.0 {
+        if points.shown[2] * largest <= 1.0 || points.shown[0] >= 1.0 {
             return [0.0; 2];
         }
-        let Noise { mean, .. } = self.noise;
-        let shown = [mean - points.below, mean, mean + points.above].map(|scene| {
-            let scale = (scene / f64::from(strength)) as f32;
-            self.shown.opponent(self.pixel, rgb.map(|channel| channel * scale))
-        });
-        let variance = |signal: fn(&Opponent) -> f32| {
-            let signals = shown.iter().map(|shown| f64::from(signal(shown)));
-            variance_of(points.weights(self.noise).into_iter().zip(signals)) as f32
-        };
-        [variance(|shown| shown.red_green), variance(|shown| shown.yellow_violet)]
+        let (_, shown) = self.shown.coloured_pixel(self.pixel, self.noise, rgb.map(|channel| channel / strength));
+        shown.map_or([0.0; 2], |shown| variances_of_tints(&shown, self.noise))
     }
 
     /// Whether normal noise reaches over a clip of the display. `relative`: below, at and above the mean.
@@ -206,21 +246,28 @@ impl NoisyPixel<'_> {
         variance_of(self.normal_points().map(|(scene, weight)| (weight, self.cd_m2(scene)))) as f32
     }
 
-    /// Luminances of normal noise, cd/m², and what they weigh: the midpoint rule. No light is below 0, which who asks has to see to.
+    /// Luminances of normal noise, cd/m², and what they weigh. No light is below 0, which who asks has to see to.
     fn normal_points(&self) -> impl Iterator<Item = (f64, f64)> + Clone {
-        const STEPS: i32 = 10;
         let (mean, deviation) = (self.noise.mean, self.noise.deviation());
-        (-STEPS..=STEPS).map(move |step| {
-            let deviations = FARTHEST * f64::from(step) / f64::from(STEPS);
-            (mean + deviations * deviation, (-0.5 * deviations * deviations).exp())
-        })
+        NORMAL_POINTS.iter().map(move |&(deviations, weight)| (mean + deviations * deviation, weight))
+    }
+
+    /// Whether normal noise leaves nothing below white.
+    fn is_all_white(&self) -> bool {
+        self.relative(self.noise.mean - FARTHEST * self.noise.deviation()) >= 1.0
     }
 
     fn relative(&self, scene_cd_m2: f64) -> f32 {
-        self.shown.relative(self.pixel, scene_cd_m2)
+        match self.hue {
+            None => self.shown.relative(self.pixel, scene_cd_m2),
+            Some(hue) => {
+                let shown = self.shown.opponent(self.pixel, hue.map(|channel| channel * scene_cd_m2.max(0.0) as f32));
+                shown.achromatic / self.shown.span_cd_m2()
+            }
+        }
     }
 
     fn cd_m2(&self, scene_cd_m2: f64) -> f64 {
-        f64::from(self.shown.cd_m2(self.pixel, scene_cd_m2 as f32))
+        f64::from(self.shown.emitted_cd_m2(self.relative(scene_cd_m2)))
     }
 }

@@ -71,7 +71,7 @@ impl FittedTone for FittedClip {
         light(rgb_cd_m2).map(|channel| self.relative_luminance_at(pixel, channel).min(1.0))
     }
 
-    fn is_white_at_white(&self) -> bool {
+    fn keeps_luminance(&self) -> bool {
         false
     }
 

@@ -19,6 +19,7 @@ mod absolute;
 pub mod acuity;
 mod agx;
 mod clipped;
+mod coloured;
 mod constant;
 mod duplex;
 mod durand_dorsey00;
@@ -53,6 +54,7 @@ mod words;
 pub use absolute::Absolute;
 pub use agx::Agx;
 pub use clipped::{Linear, Srgb};
+pub use coloured::coloured;
 pub use constant::{Constant, Exposure};
 pub use durand_dorsey00::DurandDorsey00;
 pub use ferwerda96::Ferwerda96;
@@ -175,9 +177,9 @@ pub trait FittedTone: Send + Sync + Debug {
         self.relative_luminance_at(pixel, luminance).min(1.0) / luminance
     }
 
-    /// Whether every colour is shown as white whose luminance the operator takes to white or beyond. Not where it bends or clips each
-    /// channel by itself: a blue of any luminance stays blue.
-    fn is_white_at_white(&self) -> bool {
+    /// Whether every colour is shown as bright as a grey of its luminance, and so as white where that is. Not where each channel is bent
+    /// or clipped by itself: a blue of any luminance stays blue ([`coloured`]).
+    fn keeps_luminance(&self) -> bool {
         true
     }
 

@@ -74,7 +74,7 @@ impl FittedTone for FittedPbrNeutral {
         tint_slope(self, pixel, scene_cd_m2)
     }
 
-    fn is_white_at_white(&self) -> bool {
+    fn keeps_luminance(&self) -> bool {
         false
     }
 

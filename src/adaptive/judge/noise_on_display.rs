@@ -5,7 +5,7 @@ use super::super::statistics::{DifferenceOnDisplay, by_channel};
 use crate::film::{CHANNELS, Film, Halves, share_of_mean};
 use crate::sampler::Half;
 use fechner_perception::opponent::Opponent;
-use fechner_perception::seen::{self, SceneColours};
+use fechner_perception::seen::{self, NoiseShown, SceneColours};
 use fechner_perception::tone::{FittedTone, Pixel, SceneLight};
 use fechner_perception::{PIXELS_A_TASK, Plane};
 use rayon::prelude::*;
@@ -33,22 +33,21 @@ pub(super) struct NoiseOnDisplay<'a> {
 }
 
 impl NoiseOnDisplay<'_> {
-    /// Displayed over scene variance by channel about a luminance, cd/m². `variance`: of one sample of a pixel in a channel, in scene
+    /// Displayed over scene variance by channel about a luminance, cd/m². `variance`: of one sample of a pixel by channel, in scene
     /// units.
-    pub(super) fn scales(&self, light: &Plane, variance: impl Fn(usize, usize) -> f64 + Sync) -> [Plane; CHANNELS] {
-        let scene = self.of_mean(light, variance);
-        let shown = self.displayed(light, &scene);
+    pub(super) fn scales(
+        &self,
+        light: &Plane,
+        variance: impl Fn(usize) -> [f64; CHANNELS] + Sync,
+    ) -> [Plane; CHANNELS] {
         let nits_squared = self.nits_squared();
-        by_channel(|c| {
-            scene[c].combined(&shown[c], |scene, shown| {
-                let (scene, shown) = (f64::from(scene), f64::from(shown));
-                match shown / scene * nits_squared {
-                    _ if scene == 0.0 => 0.0,
-                    scale if scale.is_finite() => scale as f32,
-                    // Nobody can say how it looks, least of all that it cannot be seen.
-                    _ => f32::INFINITY,
-                }
-            })
+        self.of_displayed(light, variance, |scene, shown| {
+            match f64::from(shown) / f64::from(scene) * nits_squared {
+                _ if scene == 0.0 => 0.0,
+                scale if scale.is_finite() => scale as f32,
+                // Nobody can say how it looks, least of all that it cannot be seen.
+                _ => f32::INFINITY,
+            }
         })
     }
 
@@ -56,22 +55,30 @@ impl NoiseOnDisplay<'_> {
         self.settings.nits_per_unit * self.settings.nits_per_unit * self.inflation
     }
 
-    /// Variance of the mean by channel, (cd/m²)² of the scene. Arguments as of [`Self::scales`].
-    fn of_mean(&self, light: &Plane, variance: impl Fn(usize, usize) -> f64 + Sync) -> [Plane; CHANNELS] {
+    /// `of` the mean's variance in the scene and as displayed, (cd/m²)², of each pixel by channel. Arguments as of [`Self::scales`].
+    fn of_displayed(
+        &self,
+        light: &Plane,
+        variance: impl Fn(usize) -> [f64; CHANNELS] + Sync,
+        of: impl Fn(f32, f32) -> f32 + Sync,
+    ) -> [Plane; CHANNELS] {
+        let shown = NoiseShown::new(self.tone, &self.settings.viewing.display);
         let nits_squared = self.nits_squared();
-        by_channel(|c| {
-            Plane::from_fn(light.width(), light.height(), |x, y| {
-                let of_mean = variance(y * light.width() + x, c) * f64::from(self.shares.get(x, y));
-                (of_mean * nits_squared) as f32
-            })
+        let width = light.width();
+        planes_of(width, light.values().len(), |index| {
+            let share = f64::from(self.shares.values()[index]);
+            let scene = variance(index).map(|variance| (variance * share * nits_squared) as f32);
+            let pixel = Pixel { x: index % width, y: index / width };
+            let shown = shown.opponent_variances(pixel, light.values()[index], self.colours.at(index), scene);
+            std::array::from_fn(|c| of(scene[c], shown[c]))
         })
     }
+}
 
-    /// What of a variance by channel, (cd/m²)² of the scene, the display shows.
-    fn displayed(&self, light: &Plane, scene: &[Plane; CHANNELS]) -> [Plane; CHANNELS] {
-        let display = &self.settings.viewing.display;
-        seen::display_opponent_variances(self.tone, display, light, self.colours, scene.each_ref())
-    }
+/// Planes of what is found for each of so many pixels, by channel.
+fn planes_of(width: usize, pixels: usize, of: impl Fn(usize) -> [f32; CHANNELS] + Sync) -> [Plane; CHANNELS] {
+    let found: Vec<_> = (0..pixels).into_par_iter().with_min_len(PIXELS_A_TASK).map(&of).collect();
+    by_channel(|c| Plane::from_fn(width, pixels / width.max(1), |x, y| found[y * width + x][c]))
 }
 
 /// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display
@@ -87,7 +94,7 @@ pub fn display_scale(
     let chromatic_slope = &seen::display_chromatic_slope(tone, &settings.viewing.display, luminance);
     let colours = SceneColours { rgb: rgb_cd_m2, chromatic_slope };
     NoiseOnDisplay { shares: &variance_shares(film), colours, tone, settings, inflation: 1.0 }
-        .scales(luminance, |pixel, c| film.halves(pixel).sample_variance(c))
+        .scales(luminance, |pixel| film.halves(pixel).sample_variances())
 }
 
 /// What the halves differ by as displayed, by channel, and what independent samples about the guide's luminance would. `guide`: that,
@@ -108,29 +115,24 @@ pub(super) fn difference_on_display(
         Halves::Only(_) => 0.0,
     });
     let noise = NoiseOnDisplay { shares: &of_halves, colours, tone, settings, inflation: 1.0 };
-    let (squared, displayed) = rayon::join(
+    let (squared, expected) = rayon::join(
         || squared_differences(film, guide.width(), tone, settings),
-        || noise.displayed(guide, &noise.of_mean(guide, |pixel, c| film.halves(pixel).sample_variance(c))),
+        || noise.of_displayed(guide, |pixel| film.halves(pixel).sample_variances(), |_, displayed| 0.5 * displayed),
     );
-    DifferenceOnDisplay { squared, expected: displayed.map(|variance| variance.map(|variance| 0.5 * variance)) }
+    DifferenceOnDisplay { squared, expected }
 }
 
 /// Square of half of what the halves differ by as displayed, by channel, (cd/m²)²; 0 where one of them has no samples.
 fn squared_differences(film: &Film, width: usize, tone: &dyn FittedTone, settings: &LoopSettings) -> [Plane; CHANNELS] {
-    let differences: Vec<[f32; CHANNELS]> = (0..film.pixel_count())
-        .into_par_iter()
-        .with_min_len(PIXELS_A_TASK)
-        .map(|index| {
-            let Halves::Both(both) = film.halves(index) else { return [0.0; CHANNELS] };
-            let pixel = Pixel { x: index % width, y: index / width };
-            let [a, b] = both.map(|half| {
-                let rgb_cd_m2 = half.mean.map(|channel| (settings.nits_per_unit * channel) as f32);
-                seen::display_opponent(tone, &settings.viewing.display, pixel, rgb_cd_m2)
-            });
-            let half = |of: fn(&Opponent) -> f32| 0.5 * (of(&a) - of(&b));
-            [half(|shown| shown.achromatic), half(|shown| shown.red_green), half(|shown| shown.yellow_violet)]
-                .map(|difference| difference * difference)
-        })
-        .collect();
-    by_channel(|c| film.plane(|index| differences[index][c]))
+    planes_of(width, film.pixel_count(), |index| {
+        let Halves::Both(both) = film.halves(index) else { return [0.0; CHANNELS] };
+        let pixel = Pixel { x: index % width, y: index / width };
+        let [a, b] = both.map(|half| {
+            let rgb_cd_m2 = half.mean.map(|channel| (settings.nits_per_unit * channel) as f32);
+            seen::display_opponent(tone, &settings.viewing.display, pixel, rgb_cd_m2)
+        });
+        let half = |of: fn(&Opponent) -> f32| 0.5 * (of(&a) - of(&b));
+        [half(|shown| shown.achromatic), half(|shown| shown.red_green), half(|shown| shown.yellow_violet)]
+            .map(|difference| difference * difference)
+    })
 }

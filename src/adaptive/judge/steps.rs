@@ -16,7 +16,7 @@ use fechner_perception::model::{ModelInputs, ThresholdModel};
 use fechner_perception::seen::{self, SceneColours};
 use fechner_perception::threshold::{GuideNoise, ThresholdInputs, ThresholdMap, threshold_map};
 use fechner_perception::tone::acuity::BehindAcuity;
-use fechner_perception::tone::{FittedTone, Pixel, SceneLight};
+use fechner_perception::tone::{FittedTone, Pixel, SceneLight, coloured};
 use std::borrow::Cow;
 
 /// The picture without its noise, from which the rest of a look is made: denoised for output where it is, else for this.
@@ -49,12 +49,13 @@ impl<'a> Guide<'a> {
         seen::display_luminance(tone, &settings.viewing.display, self.luminance_cd_m2())
     }
 
-    /// The operator's fit: one that was made elsewhere, or to this.
+    /// The operator's fit, one that was made elsewhere, or to this; for luminance of this picture's colours.
     pub(super) fn tone(&self, settings: &LoopSettings) -> Box<dyn FittedTone> {
-        match &settings.fitted {
+        let fitted = match &settings.fitted {
             Some(fitted) => fitted.clone().restore(),
             None => settings.operator.fit(&self.light.guide(), &settings.viewing, None),
-        }
+        };
+        coloured(fitted, self.luminance_cd_m2().width(), &self.rgb_cd_m2)
     }
 }
 
@@ -83,7 +84,7 @@ impl Scatter {
         let colours = SceneColours { rgb: &guide.rgb_cd_m2, chromatic_slope: &chromatic_slope };
         let noise = NoiseOnDisplay { shares: &shares, colours, tone, settings, inflation };
         let (scales, difference) = rayon::join(
-            || noise.scales(luminance, |pixel, c| film.halves(pixel).sample_variance(c)),
+            || noise.scales(luminance, |pixel| film.halves(pixel).sample_variances()),
             || difference_on_display(film, luminance, colours, tone, settings),
         );
         let statistics = SampleStatistics::of_displayed(film, &scales, &difference);
@@ -130,8 +131,8 @@ impl Scatter {
         let noise = NoiseOnDisplay { shares: &self.shares, colours, tone, settings, inflation };
         Half::BOTH.map(|half| {
             let other = half.other();
-            let variance = |pixel: usize, c: usize| film.half(other)[pixel].sample_variance(c);
-            noise.scales(&lights[other.index()].mean_cd_m2, variance)
+            let variances = |pixel: usize| std::array::from_fn(|c| film.half(other)[pixel].sample_variance(c));
+            noise.scales(&lights[other.index()].mean_cd_m2, variances)
         })
     }
 
