@@ -13,6 +13,7 @@ use fechner::output::OutputError;
 use fechner::poison::Unpoisoned as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Writes the film's file so often that a kill never costs more than was agreed.
@@ -21,13 +22,24 @@ pub(super) struct Keeper {
     every: Duration,
     header: Header,
     seeds: SeedsSoFar,
+    /// Samples traced since the last chance.
+    traced: AtomicU64,
     history: Mutex<History>,
 }
+
+/// Intervals from which on the tracer's own batches, of seconds, come often enough.
+const LONG_INTERVAL: Duration = Duration::from_secs(30);
+/// Samples of a batch while nobody knows how long they take: a tenth of a second of slow ones.
+const FIRST_BATCH: u64 = 1 << 12;
+/// Batches in an interval. With the tracer's own, films that were to be kept every second were kept every 2 to 4.
+const BATCHES_AN_INTERVAL: f64 = 8.0;
 
 /// What was written so far, and how long it took.
 struct History {
     last_snapshot: Instant,
     last_chance: Instant,
+    /// Of the last batch.
+    samples_a_second: Option<f64>,
     longest_wait: Duration,
     longest_write: Duration,
     writing: Duration,
@@ -44,9 +56,11 @@ impl Keeper {
             every: arguments.checkpoint_every,
             header,
             seeds,
+            traced: AtomicU64::new(0),
             history: Mutex::new(History {
                 last_snapshot: now,
                 last_chance: now,
+                samples_a_second: None,
                 longest_wait: Duration::ZERO,
                 longest_write: Duration::ZERO,
                 writing: Duration::ZERO,
@@ -57,12 +71,29 @@ impl Keeper {
         }
     }
 
+    /// While a plan is traced, from any thread.
+    fn samples_done(&self, samples: u64) {
+        self.traced.fetch_add(samples, Ordering::Relaxed);
+    }
+
+    /// Most samples until the next chance.
+    fn most_samples_a_batch(&self) -> u64 {
+        if self.every >= LONG_INTERVAL {
+            return u64::MAX;
+        }
+        let samples_a_second = self.history.lock().unpoisoned().samples_a_second;
+        let of_interval = |pace: f64| (pace * self.every.as_secs_f64() / BATCHES_AN_INTERVAL) as u64;
+        samples_a_second.map_or(FIRST_BATCH, of_interval).max(1)
+    }
+
     /// Writes if waiting for the next chance could lose too much: the longest wait and the longest write so far are
     /// counted in, since a kill in the middle of writing leaves the file before. They count for half the interval at
     /// most: a look or an audit that once took longer must not make every batch write.
     fn chance(&self, state: &RenderState) {
         let mut history = self.history.lock().unpoisoned();
-        history.longest_wait = history.longest_wait.max(history.last_chance.elapsed());
+        let waited = history.last_chance.elapsed();
+        history.samples_a_second = Some(self.traced.swap(0, Ordering::Relaxed) as f64 / waited.as_secs_f64().max(1e-6));
+        history.longest_wait = history.longest_wait.max(waited);
         let reserve = (history.longest_wait + history.longest_write).min(self.every / 2);
         if history.last_snapshot.elapsed() + reserve >= self.every {
             self.write(state, &mut history);
@@ -153,6 +184,23 @@ mod tests {
         let watch = Watch::new(Arc::default(), Console::new(None), Some(keeper), None, None);
         watch.failed(&RenderState::new(1, 1, &Limits::of_visibility(1.0)));
         read_checkpoint(&film).expect("kept");
+    }
+
+    /// Where a film is kept often, a batch is an eighth of the interval; where it is not, the tracer's own.
+    #[test]
+    fn batches_are_short_where_a_film_is_kept_often() {
+        let of = |every: Duration| {
+            let arguments = CheckpointArguments { checkpoint: None, checkpoint_every: every, resume: false };
+            Keeper::new(&arguments, header(), SeedsSoFar::of_one(0))
+        };
+        let often = of(Duration::from_secs(20));
+        assert_eq!((often.most_samples_a_batch(), of(EVERY).most_samples_a_batch()), (FIRST_BATCH, u64::MAX));
+        std::thread::sleep(Duration::from_millis(5));
+        often.samples_done(1_000_000);
+        often.chance(&RenderState::new(1, 1, &Limits::of_visibility(1.0)));
+        // At most a million in 5 ms.
+        let most = often.most_samples_a_batch();
+        assert!((1..=500_000_000).contains(&most), "{most}");
     }
 
     /// What cannot be written is tried again as often as it would have been written, and not at every batch.

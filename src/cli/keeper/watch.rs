@@ -77,13 +77,17 @@ impl Monitor for Watch<'_> {
 
     fn samples_done(&self, samples: u64) {
         self.console.samples_done(samples);
+        if let Some(keeper) = &self.keeper {
+            keeper.samples_done(samples);
+        }
         if let Some(audience) = &self.audience {
             audience.samples_done(samples);
         }
     }
 
     fn most_samples_a_batch(&self) -> u64 {
-        self.audience.as_ref().map_or(u64::MAX, Audience::most_samples_a_batch)
+        let of_audience = self.audience.as_ref().map_or(u64::MAX, Audience::most_samples_a_batch);
+        self.keeper.as_ref().map_or(u64::MAX, Keeper::most_samples_a_batch).min(of_audience)
     }
 
     fn between_batches(&self, state: &RenderState) -> Directive {
