@@ -46,20 +46,25 @@ pub struct DifferenceOnDisplay {
     pub squared: [Plane; CHANNELS],
     /// What that would be of independent samples which scatter as they are taken to.
     pub expected: [Plane; CHANNELS],
+    /// How many times that the differences may show.
+    pub most_factor: f32,
 }
+
+/// Most times of what independent samples would differ by: stratified samples do better, hardly ever worse.
+pub const MOST_FACTOR: f32 = 1.2;
 
 impl SampleStatistics {
     /// Pools a film. `scale` turns each pixel's scene variance, by channel, into what counts: displayed variance, since a
     /// lamp's border scatters far above what the display can show, and its dark neighbours must not inherit that.
     pub fn of(film: &Film, scale: &[Plane; CHANNELS]) -> Self {
-        Self::by(film, scale, |_, evidence| evidence)
+        Self::by(film, scale, MOST_FACTOR, |_, evidence| evidence)
     }
 
     /// The same, with the halves' differences as the display shows them. Of what is mostly beyond white, variance times a scale tells up to 7
     /// times the noise that is seen (`benches/results/sampling.md`, what moves the mean).
     pub fn of_displayed(film: &Film, scale: &[Plane; CHANNELS], difference: &DifferenceOnDisplay) -> Self {
-        let DifferenceOnDisplay { squared, expected } = difference;
-        Self::by(film, scale, |pixel, mut evidence| {
+        let DifferenceOnDisplay { squared, expected, most_factor } = difference;
+        Self::by(film, scale, *most_factor, |pixel, mut evidence| {
             for (evidence, (squared, expected)) in evidence.iter_mut().zip(squared.iter().zip(expected)) {
                 evidence.squared_difference = f64::from(squared.values()[pixel]);
                 evidence.expected_difference = f64::from(expected.values()[pixel]);
@@ -71,6 +76,7 @@ impl SampleStatistics {
     fn by(
         film: &Film,
         scale: &[Plane; CHANNELS],
+        most_factor: f32,
         refined: impl Fn(usize, [PixelEvidence; CHANNELS]) -> [PixelEvidence; CHANNELS] + Sync,
     ) -> Self {
         let width = film.width() as usize;
@@ -84,7 +90,7 @@ impl SampleStatistics {
         let pooled = pooled_by_neighbours(&evidence, &surfaces, width);
         let channels = pooled.map(|Pooled { variance, factor, factor_with_own }| ChannelStatistics {
             pooled: variance,
-            low_discrepancy_factor: factor,
+            low_discrepancy_factor: factor.map(|factor| factor.min(most_factor)),
             factor_with_own,
         });
         Self { channels }

@@ -5,7 +5,7 @@ use crate::denoise::Denoiser;
 use crate::film::film_of_samples;
 use crate::integrator::{FirstHit, PathSample};
 use crate::sampler::hash_words;
-use fechner_perception::tone::SceneLight;
+use fechner_perception::tone::{Pixel, SceneLight, operator};
 use glam::Vec3;
 
 /// Noise that leaves luminance alone is seen by its colour: no stop at the pilot.
@@ -46,6 +46,21 @@ fn noise_beyond_white_is_not_seen() {
         let told = judgement.predicted.quantile(0.99);
         assert!(told < most, "{told}");
     }
+}
+
+/// A wall far beyond white in red, and below it in green and blue: where each channel is clipped by itself, its noise is seen there. By
+/// greys of its luminance its visibility was told as 0, and the wall as white.
+#[test]
+fn noise_below_a_clipped_channel_is_seen() {
+    let red = Vec3::new(20.0, 0.4, 0.2);
+    let film = film_of(|_, random| red * (1.0 + 0.5 * random));
+    let settings = LoopSettings { operator: operator("srgb", None).expect("an operator"), ..settings() };
+    let judgement = judge(&film, &settings, 1.0).expect("judges");
+    let (predicted, measured) = (judgement.predicted.mean(), judgement.measured_error().visibility.mean());
+    assert!(predicted > 2.0 && (0.7..1.4).contains(&(predicted / measured)), "{predicted} for {measured}");
+    let wall_cd_m2 = 100.0 * fechner_perception::photometry::luminance(red.to_array());
+    let shown = judgement.tone.relative_luminance_at(Pixel { x: 32, y: 32 }, wall_cd_m2);
+    assert!((shown - 0.59).abs() < 0.02, "{shown} of white");
 }
 
 /// A film of so many samples of grey noise in half A of each pixel, and so many in half B.

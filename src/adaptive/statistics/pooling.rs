@@ -11,8 +11,8 @@ use std::slice::ChunksMut;
 
 /// Pixels to each side that are pooled.
 const POOL_RADIUS: usize = 3;
-/// Range of the low-discrepancy factor: stratified samples do better than their scatter says, hardly ever worse.
-const FACTOR_RANGE: (f32, f32) = (0.02, 1.2);
+/// Least low-discrepancy factor.
+const LEAST_FACTOR: f32 = 0.02;
 /// Evidence is cut here, so that sums and products of weights stay finite.
 const MOST_EVIDENCE: f64 = 1e36;
 
@@ -288,7 +288,7 @@ impl Sums {
         for ((sums, own), row) in self.channels.iter().zip(own).zip(rows) {
             // A pixel like none of its neighbours has only itself to go by.
             row.variance[column] = if weight > 0.0 { sums.variance[lane] / weight } else { own.variance as f32 };
-            row.factor[column] = sums.factor(lane).clamp(FACTOR_RANGE.0, FACTOR_RANGE.1);
+            row.factor[column] = sums.factor(lane).max(LEAST_FACTOR);
             row.factor_with_own[column] = match f64::from(sums.expected[lane]) + own.expected_difference {
                 0.0 => 1.0,
                 expected => ((f64::from(sums.squared[lane]) + own.squared_difference) / expected) as f32,
