@@ -154,8 +154,8 @@ impl<'a> NoiseShown<'a> {
     /// the mean), on scene luminance `mean` (cd/m²): of luminance as [`display_variance`]; of colour, by most operators, the greater of
     /// two. One is what the operator leaves of tints, as far as there is room for them below the display's white, where every colour is
     /// white; nothing is taken off at black, whose tints are small by themselves. The other is what becomes of a `colour` that fits the
-    /// display less, the brighter it is: red at half of white's luminance pales with each step towards it. Operators that bend or clip
-    /// each channel by itself ([`FittedTone::keeps_luminance`]) are asked for the colour as noise has it.
+    /// display less, the brighter it is: red at half of white's luminance pales with each step towards it. An operator that knows the
+    /// picture's colours ([`crate::tone::coloured`]) is asked what it makes of them with noise.
     ///
     /// What is not finite, or of negative variance, gets infinity; colour also where luminance's variance is so.
     #[must_use]
@@ -167,7 +167,7 @@ impl<'a> NoiseShown<'a> {
         }
         let noise = Noise { mean: f64::from(mean.max(0.0)), variance: f64::from(luminance) };
         let of_scene = [red_green, yellow_violet];
-        let found = if self.shown.fitted.keeps_luminance() {
+        let found = if self.shown.fitted.without_colours().is_none() {
             let noisy = self.shown.pixel(pixel, noise);
             let slope = colour.chromatic_slope;
             let tints = noisy.within_rooms(of_scene.map(|variance| slope * slope * variance), self.rooms_cd_m2);

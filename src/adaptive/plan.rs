@@ -282,7 +282,7 @@ fn doublings_for(ratio: f64, dither: f64, most: u32) -> u32 {
         return 0;
     }
     // The logarithm's floor, without one.
-    let whole = (1..=most).take_while(|&doublings| ratio >= f64::from(1 << doublings)).count() as u32;
+    let whole = (1..=most).take_while(|&doublings| ratio >= f64::from(1_u32 << doublings)).count() as u32;
     if whole == most {
         return whole;
     }

@@ -29,8 +29,10 @@ pub(super) struct Keeper {
 
 /// Intervals from which on the tracer's own batches, of seconds, come often enough.
 const LONG_INTERVAL: Duration = Duration::from_secs(30);
-/// Samples of a batch while nobody knows how long they take: a tenth of a second of slow ones.
-const FIRST_BATCH: u64 = 1 << 12;
+/// Fewest samples of a batch: a tenth of a second of slow ones.
+const LEAST_BATCH: u64 = 1 << 12;
+/// Batches take so many times what it takes to write the film, or all of the time is spent in writing it.
+const WRITES_A_BATCH: f64 = 4.0;
 /// Batches in an interval. With the tracer's own, films that were to be kept every second were kept every 2 to 4.
 const BATCHES_AN_INTERVAL: f64 = 8.0;
 
@@ -38,6 +40,8 @@ const BATCHES_AN_INTERVAL: f64 = 8.0;
 struct History {
     last_snapshot: Instant,
     last_chance: Instant,
+    /// When what is being traced began to be.
+    batch_began: Instant,
     /// Of the last batch.
     samples_a_second: Option<f64>,
     longest_wait: Duration,
@@ -60,6 +64,7 @@ impl Keeper {
             history: Mutex::new(History {
                 last_snapshot: now,
                 last_chance: now,
+                batch_began: now,
                 samples_a_second: None,
                 longest_wait: Duration::ZERO,
                 longest_write: Duration::ZERO,
@@ -81,9 +86,17 @@ impl Keeper {
         if self.every >= LONG_INTERVAL {
             return u64::MAX;
         }
-        let samples_a_second = self.history.lock().unpoisoned().samples_a_second;
-        let of_interval = |pace: f64| (pace * self.every.as_secs_f64() / BATCHES_AN_INTERVAL) as u64;
-        samples_a_second.map_or(FIRST_BATCH, of_interval).max(1)
+        let history = self.history.lock().unpoisoned();
+        let seconds_of_interval = self.every.as_secs_f64() / BATCHES_AN_INTERVAL;
+        let seconds = seconds_of_interval.max(WRITES_A_BATCH * history.longest_write.as_secs_f64());
+        let of_pace = |pace: f64| (pace * seconds) as u64;
+        history.samples_a_second.map_or(LEAST_BATCH, of_pace).max(LEAST_BATCH)
+    }
+
+    /// After a look, which is no part of a batch.
+    fn looked(&self) {
+        self.traced.store(0, Ordering::Relaxed);
+        self.history.lock().unpoisoned().batch_began = Instant::now();
     }
 
     /// Writes if waiting for the next chance could lose too much: the longest wait and the longest write so far are
@@ -91,9 +104,9 @@ impl Keeper {
     /// most: a look or an audit that once took longer must not make every batch write.
     fn chance(&self, state: &RenderState) {
         let mut history = self.history.lock().unpoisoned();
-        let waited = history.last_chance.elapsed();
-        history.samples_a_second = Some(self.traced.swap(0, Ordering::Relaxed) as f64 / waited.as_secs_f64().max(1e-6));
-        history.longest_wait = history.longest_wait.max(waited);
+        let seconds = history.batch_began.elapsed().as_secs_f64().max(1e-6);
+        history.samples_a_second = Some(self.traced.swap(0, Ordering::Relaxed) as f64 / seconds);
+        history.longest_wait = history.longest_wait.max(history.last_chance.elapsed());
         let reserve = (history.longest_wait + history.longest_write).min(self.every / 2);
         if history.last_snapshot.elapsed() + reserve >= self.every {
             self.write(state, &mut history);
@@ -102,6 +115,7 @@ impl Keeper {
             }
         }
         history.last_chance = Instant::now();
+        history.batch_began = history.last_chance;
     }
 
     /// Writes the last state.
@@ -186,21 +200,28 @@ mod tests {
         read_checkpoint(&film).expect("kept");
     }
 
-    /// Where a film is kept often, a batch is an eighth of the interval; where it is not, the tracer's own.
+    /// Where a film is kept often, a batch is an eighth of the interval, or four times what writing takes; where it is not, the tracer's own.
     #[test]
     fn batches_are_short_where_a_film_is_kept_often() {
         let of = |every: Duration| {
             let arguments = CheckpointArguments { checkpoint: None, checkpoint_every: every, resume: false };
             Keeper::new(&arguments, header(), SeedsSoFar::of_one(0))
         };
-        let often = of(Duration::from_secs(20));
-        assert_eq!((often.most_samples_a_batch(), of(EVERY).most_samples_a_batch()), (FIRST_BATCH, u64::MAX));
-        std::thread::sleep(Duration::from_millis(5));
-        often.samples_done(1_000_000);
+        let often = of(Duration::from_secs(16));
+        assert_eq!((often.most_samples_a_batch(), of(EVERY).most_samples_a_batch()), (LEAST_BATCH, u64::MAX));
+        let tell = |pace: f64, longest_write: Duration| {
+            let mut history = often.history.lock().expect("one thread");
+            (history.samples_a_second, history.longest_write) = (Some(pace), longest_write);
+        };
+        for (pace, write_seconds, samples) in [(1e6, 0, 2_000_000), (1e6, 3, 12_000_000), (10.0, 0, LEAST_BATCH)] {
+            tell(pace, Duration::from_secs(write_seconds));
+            assert_eq!(often.most_samples_a_batch(), samples);
+        }
+        often.samples_done(1000);
+        std::thread::sleep(Duration::from_millis(2));
         often.chance(&RenderState::new(1, 1, &Limits::of_visibility(1.0)));
-        // At most a million in 5 ms.
-        let most = often.most_samples_a_batch();
-        assert!((1..=500_000_000).contains(&most), "{most}");
+        let pace = often.history.lock().expect("one thread").samples_a_second.expect("was measured");
+        assert!(pace > 0.0 && pace <= 500_000.0, "a thousand in two milliseconds or more: {pace}");
     }
 
     /// What cannot be written is tried again as often as it would have been written, and not at every batch.

@@ -69,6 +69,17 @@ impl Shown<'_> {
         (NoisyPixel { shown: self, pixel, noise, hue: Some(hue), points }, shown)
     }
 
+    /// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², where grey light comes and goes over a colour.
+    pub(super) fn variances_along_grey(&self, pixel: Pixel, noise: Noise, hue: [f32; 3]) -> [f32; 3] {
+        let light = |scene: f64| {
+            let grey = scene - noise.mean;
+            self.opponent(pixel, hue.map(|channel| (noise.mean * f64::from(channel) + grey).max(0.0) as f32))
+        };
+        let Some(shown) = Points::of(noise, light) else { return [0.0; 3] };
+        let [red_green, yellow_violet] = variances_of_tints(&shown, noise);
+        [shown.variance(noise, |shown| shown.achromatic) as f32, red_green, yellow_violet]
+    }
+
     fn relative(&self, pixel: Pixel, scene_cd_m2: f64) -> f32 {
         self.fitted.relative_luminance_at(pixel, scene_cd_m2.max(0.0) as f32)
     }
@@ -147,9 +158,9 @@ pub(super) fn variances_of_tints(shown: &Points<Opponent>, noise: Noise) -> [f32
 
 /// A pixel with noisy light behind operator and display.
 pub(super) struct NoisyPixel<'a> {
-    pub(super) shown: &'a Shown<'a>,
-    pub(super) pixel: Pixel,
-    pub(super) noise: Noise,
+    shown: &'a Shown<'a>,
+    pixel: Pixel,
+    noise: Noise,
     /// At a luminance of 1 cd/m²; a grey's where there is none.
     hue: Option<[f32; 3]>,
     points: Option<Points<f32>>,
@@ -192,7 +203,7 @@ impl NoisyPixel<'_> {
             Some(points) => self.noise.is_normal() && at_one(points.shown[2]) != unbounded,
             None => self.noise.variance <= 0.0,
         };
-        if !is_bright {
+        if !is_bright || !self.shown.fitted.keeps_luminance() {
             return unbounded;
         }
         if self.points.is_none() {
@@ -211,12 +222,13 @@ impl NoisyPixel<'_> {
 
     /// Variances of red–green and yellow–violet as displayed, (cd/m²)², where noise of luminance brightens and darkens a colour, linear
     /// Rec. 709 RGB of any strength, that the display then shows paler and less so. 0 where the colour fits the display at all points, or is white at
-    /// all of them. By an operator that keeps luminance.
+    /// all of them.
     pub(super) fn variances_of_paling(&self, rgb: [f32; 3]) -> [f32; 2] {
         let strength = luminance(rgb);
         let (Some(points), true) = (&self.points, strength > 0.0 && strength.is_finite()) else { return [0.0; 2] };
         let largest = rgb.into_iter().fold(0.0, f32::max) / strength;
-        if points.shown[2] * largest <= 1.0 || points.shown[0] >= 1.0 {
+        let is_white = self.shown.fitted.keeps_luminance() && points.shown[0] >= 1.0;
+        if points.shown[2] * largest <= 1.0 || is_white {
             return [0.0; 2];
         }
         let (_, shown) = self.shown.coloured_pixel(self.pixel, self.noise, rgb.map(|channel| channel / strength));

@@ -1,8 +1,11 @@
 //! An operator's luminance of a picture's colours, where that is not its luminance of greys.
 
 use super::acuity::AcuityFilter;
+use super::gamut::hue;
 use super::{FittedTone, Pixel, SavedTone};
 use crate::photometry::luminance;
+use crate::plane::PIXELS_A_TASK;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// `fitted` for a picture of these colours, linear Rec. 709 RGB of any strength, row-major: asked for the luminance of a scene luminance
@@ -16,29 +19,27 @@ pub fn coloured(fitted: Box<dyn FittedTone>, width: usize, rgb: &[[f32; 3]]) -> 
     if fitted.keeps_luminance() {
         return fitted;
     }
-    let of_one_cd_m2 = |&rgb: &[f32; 3]| {
-        let strength = luminance(rgb);
-        let hue = rgb.map(|channel| channel.max(0.0) / strength);
-        (strength > 0.0 && hue.iter().all(|channel| channel.is_finite())).then_some(hue)
-    };
-    Box::new(Coloured { fitted: fitted.into(), width, of_one_cd_m2: rgb.iter().map(of_one_cd_m2).collect() })
+    let hues = rgb.par_iter().with_min_len(PIXELS_A_TASK).map(|&rgb| hue(rgb).unwrap_or_default()).collect();
+    Box::new(Coloured { fitted: fitted.into(), width, hues })
 }
 
 #[derive(Clone, Debug)]
 struct Coloured {
     fitted: Arc<dyn FittedTone>,
     width: usize,
-    /// Each pixel's colour at a luminance of 1 cd/m²; `None` where it has none.
-    of_one_cd_m2: Arc<[Option<[f32; 3]>]>,
+    /// Each pixel's colour at a luminance of 1 cd/m²; black where it has none.
+    hues: Arc<[[f32; 3]]>,
 }
 
 impl FittedTone for Coloured {
     fn relative_luminance_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
         let is_inside = pixel.x < self.width;
         let index = is_inside.then(|| pixel.y.saturating_mul(self.width).saturating_add(pixel.x));
-        match index.and_then(|index| *self.of_one_cd_m2.get(index)?) {
-            Some(colour) => luminance(self.map_rgb_at(pixel, colour.map(|channel| channel * scene_cd_m2))),
-            None => self.fitted.relative_luminance_at(pixel, scene_cd_m2),
+        match index.and_then(|index| self.hues.get(index)) {
+            Some(hue) if *hue != [0.0; 3] => {
+                luminance(self.map_rgb_at(pixel, hue.map(|channel| channel * scene_cd_m2)))
+            }
+            _ => self.fitted.relative_luminance_at(pixel, scene_cd_m2),
         }
     }
 
@@ -60,6 +61,10 @@ impl FittedTone for Coloured {
 
     fn keeps_luminance(&self) -> bool {
         false
+    }
+
+    fn without_colours(&self) -> Option<&dyn FittedTone> {
+        Some(&*self.fitted)
     }
 
     fn acuity(&self) -> Option<AcuityFilter> {

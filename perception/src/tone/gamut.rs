@@ -59,6 +59,14 @@ pub fn light(rgb: [f32; 3]) -> [f32; 3] {
     rgb.map(|channel| (grey + keep * (channel - grey)).max(0.0))
 }
 
+/// The colour of light, linear Rec. 709 RGB of any strength, at a luminance of 1 and within Rec. 709; `None` of black.
+#[must_use]
+pub fn hue(rgb: [f32; 3]) -> Option<[f32; 3]> {
+    let rgb = light(rgb);
+    let hue = rgb.map(|channel| channel / luminance(rgb));
+    hue.iter().all(|channel| channel.is_finite()).then_some(hue)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

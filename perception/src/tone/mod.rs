@@ -136,7 +136,8 @@ const LEAST_GREY_CD_M2: f32 = 1e-6;
 ///
 /// There are those of this crate and no others: each can be kept with a picture, as one of the kinds that a [`SavedTone`] holds.
 pub trait FittedTone: Send + Sync + Debug {
-    /// Linear display light for a grey of scene luminance `scene_cd_m2` at `pixel`: 0 is the display's black, 1 its white.
+    /// Linear display light for a grey of scene luminance `scene_cd_m2` at `pixel`, or for the pixel's own colour ([`coloured`]): 0 is the
+    /// display's black, 1 its white.
     ///
     /// May exceed 1, which the display then clips; never NaN, never falls as its argument rises. NaN counts as black.
     fn relative_luminance_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32;
@@ -181,6 +182,11 @@ pub trait FittedTone: Send + Sync + Debug {
     /// or clipped by itself: a blue of any luminance stays blue ([`coloured`]).
     fn keeps_luminance(&self) -> bool {
         true
+    }
+
+    /// The operator itself, where this one knows the colours of a picture ([`coloured`]): for light of other colours.
+    fn without_colours(&self) -> Option<&dyn FittedTone> {
+        None
     }
 
     /// The loss of fine detail that the operator simulates. It mixes pixels: scene light goes through it before

@@ -97,10 +97,10 @@ pub fn display_scale(
         .scales(luminance, |pixel| film.halves(pixel).sample_variances())
 }
 
-/// Most times of what scatter says that halves may differ by, by operators that bend or clip each channel by itself: noise of one channel
-/// moves the others there, and luminance and tints that come and go by themselves tell 0.7 of what shows on a red wall two stops over by
-/// `pbr-neutral`. Asked for 1 it ended at 1.56 with the others' most, at 1.47 with 2 and ends at 1.23 with this.
-const MOST_FACTOR_OF_BENT: f32 = 4.0;
+/// Most times of what scatter says that halves may differ by, where the operator knows the picture's colours: how noise of single channels
+/// goes together no variances tell. A red wall two stops over by `pbr-neutral`, asked for 1, ended at 1.56 with the others' most, at 1.47
+/// with 2 and at 1.23 with this.
+const MOST_FACTOR_OF_COLOURS: f32 = 4.0;
 
 /// What the halves differ by as displayed, by channel, and what independent samples about the guide's luminance would. `guide`: that,
 /// cd/m². `colours`: of the guide.
@@ -124,7 +124,7 @@ pub(super) fn difference_on_display(
         || squared_differences(film, guide.width(), tone, settings),
         || noise.of_displayed(guide, |pixel| film.halves(pixel).sample_variances(), |_, displayed| 0.5 * displayed),
     );
-    let most_factor = if tone.keeps_luminance() { MOST_FACTOR } else { MOST_FACTOR_OF_BENT };
+    let most_factor = if tone.without_colours().is_none() { MOST_FACTOR } else { MOST_FACTOR_OF_COLOURS };
     DifferenceOnDisplay { squared, expected, most_factor }
 }
 

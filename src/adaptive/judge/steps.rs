@@ -49,13 +49,17 @@ impl<'a> Guide<'a> {
         seen::display_luminance(tone, &settings.viewing.display, self.luminance_cd_m2())
     }
 
-    /// The operator's fit, one that was made elsewhere, or to this; for luminance of this picture's colours.
+    /// The operator's fit, one that was made elsewhere, or to this; for luminance of this picture's colours, unless it is denoised.
     pub(super) fn tone(&self, settings: &LoopSettings) -> Box<dyn FittedTone> {
         let fitted = match &settings.fitted {
             Some(fitted) => fitted.clone().restore(),
             None => settings.operator.fit(&self.light.guide(), &settings.viewing, None),
         };
-        coloured(fitted, self.luminance_cd_m2().width(), &self.rgb_cd_m2)
+        match &self.rgb_cd_m2 {
+            // What is judged of a denoised picture are planes of luminance and of tints on greys.
+            Cow::Borrowed(_) => fitted,
+            Cow::Owned(rgb) => coloured(fitted, self.luminance_cd_m2().width(), rgb),
+        }
     }
 }
 
@@ -145,6 +149,8 @@ impl Scatter {
         tone: &dyn FittedTone,
         settings: &LoopSettings,
     ) -> Option<MissedNoise> {
+        // A lamp's light has not the colour of what is beside it.
+        let tone = tone.without_colours().unwrap_or(tone);
         let shown =
             |pixel: Pixel, light: f32| seen::display_luminance_at(tone, &settings.viewing.display, pixel, light);
         let at_rims = EdgeProfile::of(settings.filter).map(|profile| {

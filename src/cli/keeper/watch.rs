@@ -67,6 +67,9 @@ impl Monitor for Watch<'_> {
     }
 
     fn judged(&self, state: &RenderState, judgement: &Judgement) {
+        if let Some(keeper) = &self.keeper {
+            keeper.looked();
+        }
         if let Some(audience) = &self.audience {
             audience.judged(state, judgement);
         }
