@@ -22,6 +22,9 @@ use std::sync::Mutex;
 pub(in crate::cli) const BEFORE_BLACK: &str = "lies before black";
 
 /// Where the luminance of RGB (1, 1, 1) comes from.
+/// What becomes of light that alpha does not hold, in a PNG.
+pub(in crate::cli) const LIGHT_RAISES_ALPHA: &str = "light that covers nothing (flames, glows) is kept, and covers what lies behind as far as a PNG's alpha must to hold it";
+
 #[derive(Clone, Copy)]
 enum Unit {
     /// The file, or else what is asked for.
