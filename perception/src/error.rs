@@ -71,11 +71,13 @@ pub enum Error {
         known: String,
     },
     /// A file that is not what it should be.
-    #[error("{what}: {reason}")]
+    #[error("{what}{}: {reason}", of_line(*.line))]
     Parse {
         /// Which file or text.
         what: &'static str,
-        /// What is wrong with it, with line and column where known.
+        /// Its line that is wrong, from 1, where it is one.
+        line: Option<usize>,
+        /// What is wrong with it.
         reason: String,
     },
 }
@@ -85,6 +87,11 @@ impl Error {
     pub(crate) fn unknown_name(kind: &'static str, name: &str, known: &[&str]) -> Self {
         Self::UnknownName { kind, name: name.to_owned(), known: known.join(", ") }
     }
+}
+
+/// ", line 3", where it is known.
+fn of_line(line: Option<usize>) -> String {
+    line.map_or_else(String::new, |line| format!(", line {line}"))
 }
 
 /// A number in words, of few digits however large it is.

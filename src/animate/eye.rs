@@ -55,8 +55,7 @@ impl ShotSettings {
 
     /// Of the gaze from the frame before to the next, where each of the three has a single one.
     pub fn gaze_velocity_deg_s(&self, frame: u32) -> Option<f64> {
-        let area = self.trace.film_area();
-        let at = |frame: u32| match self.gaze.as_ref()?.of_frame(frame, area.width, area.height) {
+        let at = |frame: u32| match self.gaze.as_ref()?.of_frame(frame) {
             [gaze] => Some(*gaze),
             _ => None,
         };
@@ -84,7 +83,7 @@ mod tests {
 
     fn shot(eye: Eye, gaze: Option<&str>) -> ShotSettings {
         let viewing = Viewing::of(Display { pixels_per_degree: 40.0, ..Display::default() });
-        let gaze = gaze.map(|table| GazeTrack::parse(table).expect("a track"));
+        let gaze = gaze.map(|table| GazeTrack::parse(table, (100, 50)).expect("a track"));
         let trace = TraceSettings::new(100, 50, 0);
         ShotSettings { last: 9, gaze, eye, ..ShotSettings::new(24.0, trace, Limits::of_visibility(1.0), viewing, 1.0) }
     }

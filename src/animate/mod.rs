@@ -127,8 +127,7 @@ impl ShotSettings {
     /// The loop's settings for one frame of the shot.
     pub fn frame_settings(&self, operator: Box<dyn ToneOperator>, track: &TrackFrame) -> LoopSettings {
         let timing = FrameTiming::nearest(self.frames_per_second, self.viewing.display.persistence);
-        let size = self.trace.film_area();
-        let gazes = self.gaze.as_ref().map(|gaze| gaze.of_frame(track.frame, size.width, size.height).to_vec());
+        let gazes = self.gaze.as_ref().map(|gaze| gaze.of_frame(track.frame).to_vec());
         LoopSettings {
             sampling: self.sampling,
             gazes: gazes.unwrap_or_default(),

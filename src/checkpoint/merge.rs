@@ -2,7 +2,7 @@
 
 use super::file::read_header;
 use super::{Checkpoint, CheckpointError, Header, Seeds, read_checkpoint};
-use crate::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits};
+use crate::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, Sampling};
 use crate::adaptive::state::RenderState;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -106,6 +106,10 @@ fn add(
     sum.state.looks = sum.state.looks.saturating_add(next.state.looks);
     sum.state.seconds += next.state.seconds;
     sum.header.settings.importance = sum.header.settings.importance.or(header.settings.importance);
+    if sum.header.settings.sampling != header.settings.sampling {
+        // Counts of the sum were in part chosen by what was found.
+        sum.header.settings.sampling = Sampling::Adaptive;
+    }
     sum.header.visibility = stricter(sum.header.visibility, next.header.visibility);
     sum.header.seeds.all.extend(next.header.seeds.all);
     Ok(())

@@ -33,6 +33,7 @@ impl Tracing {
         // Without dots, so that a new setting has to be thought of.
         let TraceSettings { width, height, seed: _, max_depth, filter, clamp, sequence, crop, transparent, prune } =
             self.0;
+        // The unit that pruning knows is the scene's, of which a film keeps the hash.
         [
             Setting { words: format!("width {width}"), asks: false },
             Setting { words: format!("height {height}"), asks: false },
@@ -42,7 +43,7 @@ impl Tracing {
             Setting { words: format!("sequence {}", sequence.in_words()), asks: true },
             Setting::where_any("crop", crop.map(|Crop { x, y, width, height }| format!("{x},{y},{width},{height}"))),
             Setting { words: if transparent { "transparent" } else { "not transparent" }.into(), asks: transparent },
-            Setting::where_any("prune", prune.map(|Pruning { nits_per_unit }| format!("{nits_per_unit:?}"))),
+            Setting::where_any("prune", prune.map(|Pruning { nits_per_unit: _ }| "tvi".to_owned())),
         ]
     }
 }
@@ -100,7 +101,7 @@ mod tests {
         let whole = TraceSettings { prune: Some(Pruning { nits_per_unit: 100.0 }), ..plain() };
         let crop = Crop { x: 0, y: 0, width: 32, height: 32 };
         let part = TraceSettings { crop: Some(crop), transparent: true, ..plain() };
-        let said = ["no crop, not transparent, prune 100.0", "crop 0,0,32,32, transparent, no prune"];
+        let said = ["no crop, not transparent, prune tvi", "crop 0,0,32,32, transparent, no prune"];
         assert_eq!(from_both(whole, part), said);
         let other = TraceSettings { crop: Some(Crop { y: 4, ..crop }), ..part };
         assert_eq!(from_both(part, other), ["crop 0,0,32,32", "crop 0,4,32,32"]);

@@ -91,8 +91,8 @@ pub(super) struct AnimateArguments {
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     adapted_to: Option<f64>,
-    /// Where viewers look: lines of frame,x,y in pixels. What is far from all gazes of a frame may stay noisier; in frames without a
-    /// line everything may be looked at.
+    /// Where viewers look: lines of frame,x,y in pixels, all inside the picture. What is far from all gazes of a frame may stay noisier; in
+    /// frames without a line everything may be looked at.
     #[arg(long, value_name = "FILE.csv", conflicts_with = "pausable", help_heading = "Seeing")]
     gaze: Option<PathBuf>,
     /// What viewers' eyes do. A frame's noise stands still on the display while it is held, so that an eye that follows what moves

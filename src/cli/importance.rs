@@ -9,18 +9,16 @@ use std::path::Path;
 /// Widths over heights that differ by less than this share are the same: a small map's size is rounded to pixels.
 const SAME_SHAPE: f64 = 0.02;
 
+/// The least value: counts are found down to a tenth of it, and no noise is asked to be so much less than what can be seen.
+const LEAST: f32 = 1e-11;
+
 /// Reads a map for a picture of `size` pixels, of which `area` is rendered: luminance of an EXR or HDR file as it stands, or a
 /// PNG's or JPEG's code values from 0 to 1. A map of another size and the same shape is interpolated bilinearly.
 pub(super) fn read(path: &Path, size: (usize, usize), area: Crop) -> Result<Plane> {
     let map = InputPicture::read_values(path)?;
     let (width, height) = (map.width(), map.height());
-    if let Some(index) = map.values().iter().position(|value| !(value.is_finite() && *value > 0.0)) {
-        let (x, y, value) = (index % width, index / width, map.values()[index]);
-        bail!(
-            "{}: the importance map is {value} at ({x}, {y}); its values multiply thresholds and must be above 0: 1 changes \
-             nothing, 0.5 lets half the noise stand, 2 twice",
-            path.display()
-        );
+    if let Some(index) = map.values().iter().position(|value| !(value.is_finite() && *value >= LEAST)) {
+        bail!(refusal(path, map.values()[index], (index % width, index / width)));
     }
     let stretch = (width * size.1) as f64 / (height * size.0) as f64;
     if (stretch - 1.0).abs() > SAME_SHAPE {
@@ -36,6 +34,20 @@ pub(super) fn read(path: &Path, size: (usize, usize), area: Crop) -> Result<Plan
         let (x, y) = (x as f64 + f64::from(area.x) + 0.5, y as f64 + f64::from(area.y) + 0.5);
         bilinear(&map, x * scale.0 - 0.5, y * scale.1 - 0.5)
     }))
+}
+
+/// What to say of a value that thresholds cannot be multiplied by.
+pub(super) fn refusal(path: &Path, value: f32, (x, y): (usize, usize)) -> String {
+    let value = match value {
+        value if value.is_nan() => "not a number".to_owned(),
+        value if value != 0.0 && value.abs() < 1e-4 => format!("{value:e}"),
+        value => value.to_string(),
+    };
+    format!(
+        "{}: the importance map is {value} at ({x}, {y}); its values multiply thresholds and must be above 0, at least {LEAST:e}: 1 \
+         changes nothing, 0.5 lets half the noise stand, 2 twice",
+        path.display()
+    )
 }
 
 /// The value at a place between the centres of pixels, which are whole numbers; beyond the outermost ones it stays.

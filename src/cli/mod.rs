@@ -6,7 +6,6 @@ mod channels;
 mod claim;
 mod compare;
 mod console;
-mod covered;
 mod denoise;
 mod farm;
 mod importance;

@@ -2,10 +2,10 @@
 
 mod from_file;
 
-pub(super) use self::from_file::{BEFORE_BLACK, Source, is_of_codes, note};
-use super::covered::{Covered, Mapping};
+pub(super) use self::from_file::{BEFORE_BLACK, LIGHT_RAISES_ALPHA, Source, is_of_codes, note};
 use super::kept_tone::KeptTone;
 use anyhow::{Context, Result};
+use fechner::output::covered::{Covered, Mapping};
 use fechner::output::{self, PartOf};
 use fechner_perception::Plane;
 use fechner_perception::display::{Display, Eotf, Viewing};
@@ -197,7 +197,9 @@ impl InputPicture {
         let mut shown = self.relative_rgb(tone, &viewing.display, map_picture);
         if ground == Ground::White {
             for (rgb, coverage) in shown.iter_mut().zip(self.coverage().into_iter().flatten()) {
-                *rgb = rgb.map(|light| light + (1.0 - coverage));
+                // Light that alpha does not hold hides what lies behind, as in a PNG.
+                let held = rgb.iter().fold(*coverage, |held, light| held.max(*light)).min(1.0);
+                *rgb = rgb.map(|light| light + (1.0 - held));
             }
         }
         in_cd_m2(shown, &viewing.display)

@@ -5,6 +5,7 @@ use super::console::Console;
 use super::job::{JobArguments, Prepared};
 use super::keeper::{CheckpointArguments, Keeper, SeedsSoFar, Start, Watch};
 use super::maps::{MapTarget, check_map};
+use super::picture::{LIGHT_RAISES_ALPHA, note};
 use super::report::{Interrupter, Report, summary};
 use super::signals::listen;
 use super::targets::{Named, check_kept, check_scene_kept};
@@ -238,7 +239,9 @@ pub(super) fn write_picture(
 ) -> anyhow::Result<()> {
     match format {
         PictureFormat::Png => {
-            output::rendered::write_display_png(path, rendered, &settings.viewing.display, background)?;
+            if output::rendered::write_display_png(path, rendered, &settings.viewing.display, background)? {
+                note(path, LIGHT_RAISES_ALPHA);
+            }
         }
         PictureFormat::Exr => {
             let attributes = report.attributes();

@@ -4,16 +4,16 @@ use super::kept_tone::first_scene;
 use super::numbers::{parse_positive, parse_unit};
 use super::picture::InputPicture;
 use super::targets::{Named, display_file};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use fechner::read_file;
 use fechner::scene::Scene;
 use fechner::scene::load::count_as_read;
-use fechner_perception::csf;
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::model::{self, ThresholdModel};
 use fechner_perception::tone::{self, DEFAULT_OPERATOR};
+use fechner_perception::{Error, csf};
 use std::path::Path;
 
 /// The display where none is named.
@@ -166,7 +166,16 @@ fn find_display(name: &str) -> Result<Display> {
     }
     let text = read_file::text(Path::new(name)).with_context(|| format!("display file {name}"))?;
     count_as_read(Path::new(name));
-    Display::from_toml(&text).with_context(|| format!("display file {name}"))
+    Display::from_toml(&text).map_err(|error| in_display_file(name, error))
+}
+
+/// What is wrong with a display's file, said as of a scene's: "my.toml:2: …".
+fn in_display_file(name: &str, error: Error) -> anyhow::Error {
+    match error {
+        Error::Parse { line: Some(line), reason, .. } => anyhow!("{name}:{line}: {reason}"),
+        Error::Parse { reason, .. } => anyhow!("{name}: {reason}"),
+        other => anyhow!("{name}: {other}"),
+    }
 }
 
 /// Names of threshold models.
@@ -189,4 +198,19 @@ fn named_operators() -> impl Iterator<Item = PossibleValue> {
         let initials = tone::operator_initials().iter().filter(move |(_, full)| *full == name);
         PossibleValue::new(name).aliases(initials.map(|(initials, _)| *initials))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// It was "display file d.toml: display file: TOML parse error at line 2, column 6; …".
+    #[test]
+    fn a_wrong_display_file_is_named_once_and_by_its_line() {
+        let said = |text: &str| in_display_file("d.toml", Display::from_toml(text).expect_err(text)).to_string();
+        let curve = said("preset = 'desktop'\neotf = 'gamma22'\n");
+        assert!(curve.starts_with("d.toml:2: unknown variant `gamma22`, expected "), "{curve}");
+        assert!(said("white_cd_m2 = -5").starts_with("d.toml: white_cd_m2 is -5; "));
+        assert!(said("width_px = 1920").starts_with("d.toml: pixels a degree follow from"));
+    }
 }

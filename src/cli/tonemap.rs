@@ -7,7 +7,6 @@ mod write;
 use self::names::{frame_numbers, frames_since_last, targets};
 use self::write::write;
 use super::animate::parse_lapse_rate;
-use super::covered::Covered;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
 use super::picture::{InputPicture, is_of_codes};
 use super::seeing::{self, DEFAULT_DISPLAY, display_help, operator_values_or_all};
@@ -15,6 +14,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::animate::USUAL_FRAMES_PER_SECOND;
 use fechner::json_file;
+use fechner::output::covered::Covered;
 use fechner::output::{self, PartOf, PictureFormat, Shown};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,

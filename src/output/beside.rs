@@ -225,8 +225,11 @@ fn is_nobodys(part: &Path) -> bool {
     file.is_ok_and(|file| file.try_lock().is_ok())
 }
 
-/// The system's words without the path that `tempfile` adds.
+/// The system's words without the path that `tempfile` adds. Of a folder that is there it means that no file can be made in it, as in `/proc`.
 fn plain(error: &std::io::Error) -> String {
+    if error.kind() == std::io::ErrorKind::NotFound {
+        return "the folder takes no new files".to_owned();
+    }
     error
         .raw_os_error()
         .map_or_else(|| error.kind().to_string(), |code| std::io::Error::from_raw_os_error(code).to_string())
@@ -271,6 +274,14 @@ mod tests {
         assert!(result.unwrap_err().to_string().ends_with("a.png: the disk is full"));
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["a.png"]);
+    }
+
+    /// It was told as "entity not found" of a folder that is there.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_folder_that_takes_no_files_is_named() {
+        let error = write_beside(Path::new("/proc/x.png"), |_| Ok(())).unwrap_err().to_string();
+        assert!(error.ends_with("cannot make a file in /proc: the folder takes no new files"), "{error}");
     }
 
     /// One fixed name beside the file was another's, who renamed it half written.

@@ -9,6 +9,7 @@
 pub mod attribute;
 mod beside;
 pub mod channel;
+pub mod covered;
 mod exr_file;
 mod exr_header;
 pub mod false_colour;

@@ -1,5 +1,6 @@
 //! The files a render leaves: what the display shows, or every layer of it.
 
+use super::covered::Covered;
 use super::{
     Attribute, NITS_PER_UNIT, OutputError, PartOf, Picture, channel, write_exr, write_png_for, write_png_with_alpha_for,
 };
@@ -21,8 +22,8 @@ pub enum Background {
     Transparent,
 }
 
-/// Writes the picture through its tone operator, coded for the display. A transparent background gives straight alpha, the
-/// colours being those of what covers the pixel.
+/// Writes the picture through its tone operator, coded for the display, and tells whether any pixel's alpha was raised. A transparent background
+/// gives straight alpha, the colours being those of what covers the pixel; light that alpha could not hold raises it, as [`Covered`] says.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -31,28 +32,26 @@ pub fn write_display_png(
     rendered: &Rendered,
     display: &Display,
     background: Background,
-) -> Result<(), OutputError> {
+) -> Result<bool, OutputError> {
     let judgement = &rendered.judgement;
     let (width, height) = (rendered.film.width(), rendered.film.height());
-    let picture = judgement.picture();
+    // As a file's readers have it: the judgement's own tells luminances as of each pixel's colour, by which nothing red is white.
+    let (tone, picture) = (judgement.tone.save().restore(), judgement.picture());
+    let tone = tone.as_ref();
     match background {
         Background::Shown => {
-            let shown = map_picture(judgement.tone.as_ref(), width as usize, picture);
-            write_png_for(path, width, height, &shown, display)
+            let shown = map_picture(tone, width as usize, picture);
+            write_png_for(path, width, height, &shown, display)?;
+            Ok(false)
         }
         Background::Transparent => {
             let coverage = rendered.film.coverage();
-            let covering = divided_by_alpha(picture, &coverage);
-            let shown = map_picture(judgement.tone.as_ref(), width as usize, &covering);
-            write_png_with_alpha_for(path, width, height, &shown, &coverage, display)
+            let covered = Covered::of(tone, map_picture, width as usize, picture, &coverage);
+            let (shown, alpha) = covered.straight();
+            write_png_with_alpha_for(path, width, height, &shown, &alpha, display)?;
+            Ok(covered.has_light_in_front())
         }
     }
-}
-
-/// Light of what covers each pixel, for a picture that is multiplied by its alpha: none where nothing does.
-pub fn divided_by_alpha(rgb: &[[f32; 3]], alpha: &[f32]) -> Vec<[f32; 3]> {
-    let scale = |alpha: f32| if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
-    rgb.iter().zip(alpha).map(|(rgb, &alpha)| rgb.map(|value| value * scale(alpha))).collect()
 }
 
 /// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent, albedo,

@@ -242,8 +242,8 @@ fn frames_are_judged_from_where_they_are_looked_at() {
     let display = "name = \"wide\"\npixels_per_degree = 2.0\nwhite_cd_m2 = 200.0\nblack_cd_m2 = 0.2\n";
     std::fs::write(folder.path().join("wide.toml"), display).expect("written");
     let samples = |gazes: Option<&str>| {
-        let mut arguments =
-            vec!["--frames", "1..1", "--visibility", "2", "--display", "wide.toml", "-o", "shot.##.png"];
+        let mut arguments = vec!["--frames", "1..1", "--shot", "0..1", "--visibility", "2", "--display", "wide.toml"];
+        arguments.extend(["-o", "shot.##.png"]);
         if let Some(gazes) = gazes {
             std::fs::write(folder.path().join("gaze.csv"), gazes).expect("written");
             arguments.extend(["--gaze", "gaze.csv"]);
@@ -399,12 +399,20 @@ fn a_gaze_table_says_something_of_the_shot() {
         let output = command.current_dir(at).args(["animate", "scene.toml"]).args(asked).output().expect("it starts");
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
-    for table in ["100,4,8\n101,4,8\n", "0,1e6,8\n", "frame,x,y\n"] {
-        let (status, said) = say(table, "gaze");
-        assert!(status == Some(2) && said.contains("says nothing of frames 0 to 1"), "{table}: {said}");
+    // With the eye at rest all of these were taken, with a note at most.
+    for (table, expected) in [
+        ("100,4,8\n101,4,8\n", "says nothing of frames 0 to 1: it has lines of frames 100 to 101"),
+        ("frame,x,y\n", "it has no line of any frame"),
+        ("", "it has no line of any frame"),
+        ("0,4,8\n1,1e6,8\n", "gaze.csv: line 2: 1000000,8 is outside "),
+    ] {
+        for eye in ["gaze", "none"] {
+            let (status, said) = say(table, eye);
+            assert!(status == Some(2) && said.contains(expected), "{table}: {said}");
+        }
     }
-    let (status, said) = say("100,4,8\n", "none");
-    assert!(status == Some(0) && said.contains("says of 0 of 2 frames"), "{said}");
+    let (status, said) = say("0,4,8\n", "none");
+    assert!(status == Some(0) && said.contains("says of 1 of 2 frames"), "{said}");
     let (status, said) = say("\u{feff}0,4,8\n1,4,8\n", "gaze");
     assert!(status == Some(0) && !said.contains("says of"), "{said}");
 }

@@ -32,6 +32,20 @@ fn what_is_no_scene_is_named() {
     assert!(message("Cargo.lock").contains(".toml, .obj, .ply, .gltf, .glb, .pbrt and .xml (Mitsuba) are read"));
 }
 
+/// Initials are read, and no list shows them: "tr, fpsg, wrp, ptyg" were in it, and in no help text.
+#[test]
+fn operators_are_listed_by_their_names() {
+    let place = tempfile::tempdir().unwrap();
+    let scene = place.path().join("shown.toml");
+    let message = |operator: &str| {
+        std::fs::write(&scene, format!("[view]\noperator = \"{operator}\"\n")).unwrap();
+        load(&scene, &LoadOptions::default()).unwrap_err().to_string()
+    };
+    let unknown = message("filmic");
+    assert!(unknown.contains("shown.toml:2: ") && unknown.ends_with("pbr-neutral, agx"), "{unknown}");
+    assert!(!message("ptyg").contains("operator"), "{}", message("ptyg"));
+}
+
 #[test]
 fn our_own_scenes_load_and_survive_every_cut() {
     for entry in std::fs::read_dir(folder("scenes")).unwrap() {

@@ -288,6 +288,42 @@ fn transparent_pictures_are_seen_alike() {
     }
 }
 
+/// A lamp that lets four fifths through sends more than its alpha times white: `render` cut it there where `tonemap` and `compare` kept
+/// it, and the picture's two files were told apart by 29.7 of a threshold. Edges of what is whole keep their alpha.
+#[test]
+fn lamps_that_let_light_through_are_one_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = |of_lamp: &str| {
+        format!(
+            "nits_per_unit = 100\nenvironment = {{ luminance_cd_m2 = 50 }}\nmaterials.lamp = {{ type = 'diffuse', reflectance = 0, {of_lamp} }}\n\
+             materials.white = {{ type = 'diffuse', reflectance = 0.8 }}\n\
+             camera = {{ position = [0, 1, 4], look_at = [0, 1, 0], vertical_fov_deg = 39 }}\n\
+             [[objects]]\nmaterial = 'lamp'\nsphere = {{ center = [0.5, 1, 0], radius = 0.4 }}\n\
+             [[objects]]\nmaterial = 'white'\nrectangle = {{ corner = [-1, 0.2, 1], edge_u = [2, 0, 0], edge_v = [0, 0, -2] }}\n"
+        )
+    };
+    let alphas = |name: &str| -> Vec<u8> {
+        let picture = image::open(folder.path().join(name)).expect("a picture").into_rgba8();
+        picture.pixels().map(|pixel| pixel.0[3]).collect()
+    };
+    for (of_lamp, is_bright) in [("emission = [3, 0.1, 0.1], alpha = 0.2", true), ("emission = [0, 0, 0]", false)] {
+        std::fs::write(folder.path().join("lamp.toml"), scene(of_lamp)).expect("written");
+        for operator in ["constant", "linear", "srgb"] {
+            let how =
+                ["--transparent", "--size", "48x48", "--sampling", "uniform", "--spp", "16", "--operator", operator];
+            let [_, said] = ["a.exr", "a.png"]
+                .map(|name| run(folder.path(), &[&["render", "lamp.toml", "-o", name][..], &how].concat()));
+            assert_eq!(said.contains("light that covers nothing"), is_bright, "{operator}: {said}");
+            let (_, said) = fechner(folder.path(), &["compare", "a.exr", "a.png"]);
+            assert!(visibility(&said) < 1.5, "{operator}, {of_lamp}: {said}");
+            run(folder.path(), &["tonemap", "a.exr", "-o", "b.png"]);
+            let [rendered, shown] = ["a.png", "b.png"].map(alphas);
+            let apart = rendered.iter().zip(&shown).map(|(a, b)| a.abs_diff(*b)).max().expect("pixels");
+            assert!(apart <= 1, "{operator}, {of_lamp}: {apart} codes of alpha");
+        }
+    }
+}
+
 /// What a file says of its display goes before what another's curve suggests, whichever is named first: it was 0.4 and 25.
 #[test]
 fn a_display_that_is_told_goes_before_a_guess() {

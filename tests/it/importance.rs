@@ -1,6 +1,7 @@
 //! Samples go where a user's map sends them, and the film remembers by which map.
 
 use crate::support::command::{self, cornell_box, fechner};
+use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, WritableImage as _};
 use fechner::exr_read::{ExrImage, read_exr};
 use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr};
 use std::path::Path;
@@ -98,7 +99,17 @@ fn maps_that_cannot_multiply_thresholds_are_refused() {
     let mut wide = Picture::new(4, 2);
     wide.push_f32("Y", vec![1.0; 8]);
     write_exr(&at.join("wide.exr"), &wide).expect("written");
-    let cases: [(&[&str], &[&str]); 4] = [
+    write_map(at, "faint.exr", |x| if x == 3 { 1e-30 } else { 1.0 });
+    // Our own writer would put a number in its place.
+    let values = (0..64).map(|i| if i % 8 == 3 { f32::NAN } else { 1.0 }).collect();
+    let channel = AnyChannel::new("Y", FlatSamples::F32(values));
+    let map = Image::from_channels((8, 8), AnyChannels::sort([channel].into_iter().collect()));
+    map.write().to_file(at.join("nan.exr")).expect("written");
+    let cases: [(&[&str], &[&str]); 6] = [
+        // It was told of a "threshold map" and of a "tolerance".
+        (&["--importance", "faint.exr"], &["faint.exr", "1e-30 at (3, 0)", "at least 1e-11"]),
+        // It was told to be 0, after a note that it was replaced.
+        (&["--importance", "nan.exr"], &["nan.exr", "not a number at (3, 0)"]),
         (&["--importance", "zero.exr"], &["zero.exr", "0 at (0, 0)", "above 0"]),
         (&["--importance", "wide.exr"], &["wide.exr", "4x2", "48x48"]),
         (&["--importance", "none.exr"], &["none.exr"]),

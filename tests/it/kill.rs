@@ -247,3 +247,32 @@ fn films_are_merged_and_judged_again() {
         names(at)
     );
 }
+
+/// Samples that sight has spread were called uniform by whoever resumed so, without one more, and the word on dark surroundings was gone. Even
+/// ones may go on by any rule; and a sum of both kinds is not uniform.
+#[test]
+fn counts_are_called_by_the_rule_that_chose_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let sampling = |name: &str| -> serde_json::Value {
+        let json: serde_json::Value = serde_json::from_slice(&file(at, name)).expect("JSON");
+        json["sampling"].clone()
+    };
+    let by = |film: &str, how: &[&str]| {
+        let common = ["--spp", "40", "--visibility", "1", "-o", "x.png", "--json", "x.json", "--checkpoint", film];
+        render(at, &[&common[..], how].concat())
+    };
+    run(&mut by("seen.film", &["--seed", "2"]));
+    let as_uniform = ["--seed", "2", "--resume", "--sampling", "uniform"];
+    assert_refused(
+        &mut by("seen.film", &as_uniform),
+        &["seen.film does not fit", "by --sampling adaptive", "go on by adaptive"],
+    );
+    run(&mut by("even.film", &["--seed", "1", "--plans", "1"]));
+    run(&mut by("even.film", &["--seed", "1", "--resume", "--sampling", "uniform"]));
+    assert_eq!(sampling("x.json"), "uniform");
+    let mut merge = fechner();
+    merge.args(["merge", "even.film", "seen.film", "-o", "sum.png", "--json", "sum.json"]).current_dir(at);
+    run(&mut merge);
+    assert_eq!(sampling("sum.json"), "adaptive");
+}

@@ -5,6 +5,9 @@ use serde::Deserialize;
 use super::{Display, Eotf, pixels_per_degree};
 use crate::error::Error;
 
+/// What errors are of.
+const WHAT: &str = "display file";
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct DisplayFile {
@@ -36,7 +39,10 @@ enum Density {
 
 impl DisplayFile {
     fn read(text: &str) -> Result<Self, Error> {
-        toml::from_str(text).map_err(|error| wrong(error.to_string()))
+        toml::from_str(text).map_err(|error| {
+            let line = error.span().map(|span| 1 + text[..span.start].matches('\n').count());
+            Error::Parse { what: WHAT, line, reason: error.message().trim_end().replace('\n', "; ") }
+        })
     }
 
     fn base(&self) -> Result<Display, Error> {
@@ -71,7 +77,7 @@ impl DisplayFile {
 }
 
 fn wrong(reason: impl Into<String>) -> Error {
-    Error::Parse { what: "display file", reason: reason.into() }
+    Error::Parse { what: WHAT, line: None, reason: reason.into() }
 }
 
 impl Display {
@@ -142,7 +148,10 @@ mod tests {
         assert!(matches!(Display::from_toml("white_cd_m2 = -5"), Err(Error::OutOfRange { .. })));
         let even = Display::from_toml("white_cd_m2 = 100\nblack_cd_m2 = 100");
         assert!(even.unwrap_err().to_string().contains("below white_cd_m2"));
-        assert!(matches!(Display::from_toml("colour = 'red'"), Err(Error::Parse { .. })));
+        assert!(matches!(Display::from_toml("colour = 'red'"), Err(Error::Parse { line: Some(1), .. })));
+        let curve = Display::from_toml("preset = 'desktop'\neotf = 'gamma22'").unwrap_err();
+        assert!(matches!(curve, Error::Parse { line: Some(2), .. }), "{curve:?}");
+        assert!(curve.to_string().starts_with("display file, line 2: unknown variant `gamma22`"), "{curve}");
         assert!(matches!(Display::from_toml("preset = 'wall'"), Err(Error::UnknownName { .. })));
         assert!(matches!(Display::from_toml("width_px = 1920"), Err(Error::Parse { .. })));
         assert!(matches!(Display::from_toml("preset = 'desktop'\ndistance_m = 1.2"), Err(Error::Parse { .. })));

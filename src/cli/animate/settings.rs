@@ -71,26 +71,23 @@ fn eye(arguments: &AnimateArguments) -> Result<Eye> {
     Ok(followed)
 }
 
-/// Where the shot is looked at. A table of another shot's frames, or of places outside the picture, is a slip.
+/// Where the shot is looked at. A table of another shot's frames, or of none, is a slip.
 fn gaze(arguments: &AnimateArguments, size: Size, shot: Frames) -> Result<Option<GazeTrack>> {
     let Some(path) = &arguments.gaze else { return Ok(None) };
     let table = read_file::text(path).with_context(|| path.display().to_string())?;
-    let track = GazeTrack::parse(&table).with_context(|| path.display().to_string())?;
-    let says = |frame: &u32| !track.of_frame(*frame, size.width, size.height).is_empty();
-    let count = shot.last - shot.first + 1;
-    match (shot.first..=shot.last).filter(says).count() {
-        0 if arguments.eye == EyeChoice::Gaze => bail!(
-            "--eye gaze: {} says nothing of frames {} to {} inside the picture of {}x{}",
-            path.display(),
-            shot.first,
-            shot.last,
-            size.width,
-            size.height
-        ),
-        found if found < count as usize => {
-            say!("note: {} says of {found} of {count} frames where in the picture is looked.", path.display());
-        }
-        _ => {}
+    let track = GazeTrack::parse(&table, (size.width, size.height)).with_context(|| path.display().to_string())?;
+    let Frames { first, last } = shot;
+    let found = (first..=last).filter(|&frame| !track.of_frame(frame).is_empty()).count();
+    let count = (last - first + 1) as usize;
+    if found == 0 {
+        let its = match track.frames() {
+            None => "has no line of any frame".to_owned(),
+            Some((first, last)) => format!("has lines of frames {first} to {last} alone"),
+        };
+        bail!("--gaze: {} says nothing of frames {first} to {last}: it {its}; expected frame,x,y", path.display());
+    }
+    if found < count {
+        say!("note: {} says of {found} of {count} frames where in the picture is looked.", path.display());
     }
     Ok(Some(track))
 }

@@ -278,7 +278,7 @@ impl<'a> Shot<'a> {
     fn write(&self, file: &Path, made: &RenderedFrame, settings: &LoopSettings, report: &Report) -> Result<()> {
         match self.format {
             PictureFormat::Png => {
-                write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?
+                write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?;
             }
             PictureFormat::Exr => {
                 let attributes = report.attributes();

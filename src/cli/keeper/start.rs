@@ -2,10 +2,11 @@
 
 use crate::cli::claim::Claim;
 use crate::cli::numbers::parse_seconds;
+use crate::cli::report::sampling_name;
 use crate::cli::words::rounded;
 use anyhow::bail;
 use clap::Args;
-use fechner::adaptive::settings::LoopSettings;
+use fechner::adaptive::settings::{LoopSettings, Sampling};
 use fechner::adaptive::state::RenderState;
 use fechner::checkpoint::{
     Checkpoint, CheckpointError, Header, Origin, Seeds, SettingsRecord, read_checkpoint, read_header,
@@ -115,6 +116,9 @@ impl CheckpointArguments {
         }
         let [seed] = header.seeds.all[..] else { bail!("a render has one seed") };
         let own = found.seeds.continued_by(seed).map_err(different)?;
+        if let Some(problem) = spread_otherwise(found.settings.sampling, header.settings.sampling, &state.film) {
+            return Err(different(problem).into());
+        }
         let mut earlier_visibilities = Vec::new();
         let state = if found.settings != header.settings {
             say!("note: the film was sampled by other settings: its samples are kept, its ladder begins anew");
@@ -132,6 +136,20 @@ impl CheckpointArguments {
         let seeds = SeedsSoFar { before: found.seeds, rays_before: state.film.rays, own: own.clone() };
         Ok(Start { header: Header { seeds: own, earlier_visibilities, ..header }, state, seeds })
     }
+}
+
+/// What keeps a film whose samples were spread by one rule from going on by another: its counts stay, and would be called the other's. By
+/// sight any film goes on.
+fn spread_otherwise(found: Sampling, asked: Sampling, film: &Film) -> Option<String> {
+    let [its, this] = [found, asked].map(sampling_name);
+    let counts = (0..film.pixel_count()).map(|pixel| film.samples(pixel));
+    let (least, most) = (counts.clone().min()?, counts.max()?);
+    (asked != Sampling::Adaptive && its != this && least < most).then(|| {
+        format!(
+            "its pixels have {least} to {most} samples by --sampling {its}, which --sampling {this} did not choose: go on by \
+             {its}, or begin another --checkpoint"
+        )
+    })
 }
 
 /// How the operator is fitted in a film of this origin that is seen as `record` says. What is wrong with the file is for others to say.

@@ -2,6 +2,7 @@
 
 use super::{Codes, Content, InputPicture};
 use crate::cli::channels::{self, Colour};
+use crate::cli::importance;
 use crate::cli::kept_tone::{self, KeptTone};
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, negative_light};
@@ -20,6 +21,9 @@ use std::sync::Mutex;
 
 /// Where what does not cover all lies, if nothing else is said.
 pub(in crate::cli) const BEFORE_BLACK: &str = "lies before black";
+
+/// What becomes of light that alpha does not hold, in a PNG.
+pub(in crate::cli) const LIGHT_RAISES_ALPHA: &str = "light that covers nothing (flames, glows) is kept, and covers what lies behind as far as a PNG's alpha must to hold it";
 
 /// Where the luminance of RGB (1, 1, 1) comes from.
 #[derive(Clone, Copy)]
@@ -75,6 +79,12 @@ impl InputPicture {
 
     fn from_exr(source: Source<'_>, exr: &ExrImage, unit: Unit) -> Result<Self> {
         let nits_per_unit = unit.in_cd_m2(source, || unit_in_file(source, exr))?;
+        if let Unit::Meaningless = unit
+            && let Some((value, at)) = first_not_finite(exr)
+        {
+            // Light that is none of a number is replaced; a map has nothing that would be right in its place.
+            bail!(importance::refusal(source.path, value, at));
+        }
         let Some(picture) = exr.scene_picture(picture_channel) else {
             bail!(
                 "{}: there are no channels R, G and B of one layer, nor Y of the root or of a layer that is called as pictures are; \
@@ -230,6 +240,20 @@ fn alpha(source: Source<'_>, exr: &ExrImage) -> Option<Vec<f32>> {
         return None;
     }
     alpha.iter().any(|&a| a < 1.0).then_some(alpha)
+}
+
+/// The first value of a picture that is not finite, and the pixel of what is shown that has it.
+fn first_not_finite(exr: &ExrImage) -> Option<(f32, (usize, usize))> {
+    let channels = match channels::colour(exr)? {
+        Colour::Rgb(channels) => channels.to_vec(),
+        Colour::Grey(luminance) => vec![luminance],
+    };
+    let width = exr.display_window.width as usize;
+    channels.into_iter().find_map(|channel| {
+        let shown = exr.in_display_window(channel.to_vec());
+        let index = shown.iter().position(|value| !value.is_finite())?;
+        Some((shown[index], (index % width, index / width)))
+    })
 }
 
 /// A channel of the file's picture by its last name, all three from one layer.

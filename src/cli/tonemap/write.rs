@@ -2,7 +2,7 @@
 
 use super::SceneFrame;
 use crate::cli::kept_tone::{LIGHT, OF_DISPLAY};
-use crate::cli::picture::note;
+use crate::cli::picture::{LIGHT_RAISES_ALPHA, note};
 use anyhow::{Context, Result};
 use fechner::output::{self, Attribute, Picture, PictureFormat, Shown, attribute, channel};
 use fechner_perception::tone::{AdaptationState, FittedTone};
@@ -26,10 +26,7 @@ fn write_png(target: &Path, frame: &SceneFrame, fitted: &dyn FittedTone) -> Resu
     let (rgb, alpha) = match frame.covered(fitted) {
         Some(covered) => {
             if covered.has_light_in_front() {
-                note(
-                    target,
-                    "light that covers nothing (flames, glows) is kept, and covers what lies behind as far as a PNG's alpha must to hold it",
-                );
+                note(target, LIGHT_RAISES_ALPHA);
             }
             let (shown, alpha) = covered.straight();
             (shown, Some(alpha))

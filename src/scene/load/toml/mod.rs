@@ -193,20 +193,25 @@ fn read_unit(value: &Value) -> Result<f64, LoadError> {
 /// The file of a display is found from `folder`, like every file that a scene names.
 fn read_view(value: &Value, folder: &Path) -> Result<ViewingDefaults, LoadError> {
     let fields = value.fields(&["display", "visibility", "operator", "exposure_stops"])?;
-    let operators = || {
-        let initials = tone::operator_initials().iter().map(|&(initials, _)| initials);
-        tone::operator_names().iter().copied().chain(initials)
-    };
     Ok(ViewingDefaults {
         display: fields.get_some("display", |value| match value.string()? {
             file if file.ends_with(".toml") => Ok(folder.join(file).to_string_lossy().into_owned()),
             _ => value.word_of(Display::preset_names().iter().copied()),
         })?,
         visibility: fields.get_some("visibility", Value::positive)?,
-        operator: fields.get_some("operator", |value| value.word_of(operators()))?,
+        operator: fields.get_some("operator", read_operator)?,
         exposure_stops: fields
             .get_some("exposure_stops", |stops| stops.within(-MOST_EXPOSURE_STOPS, MOST_EXPOSURE_STOPS))?,
     })
+}
+
+/// A tone operator's name, or its authors' initials, which no list shows.
+fn read_operator(value: &Value) -> Result<String, LoadError> {
+    let written = value.string()?;
+    if tone::operator_initials().iter().any(|(initials, _)| *initials == written) {
+        return Ok(written.to_owned());
+    }
+    value.word_of(tone::operator_names().iter().copied())
 }
 
 fn read_texture(value: &Value, folder: &Path) -> Result<TextureEntry, LoadError> {

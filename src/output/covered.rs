@@ -5,11 +5,10 @@
 //! since the soft edge of a lamp is no flame. Of light beyond that what covers the pixel sends white, channel by channel; the rest is in front
 //! of it, and adds what it adds before black.
 
-use fechner::output::rendered::divided_by_alpha;
 use fechner_perception::tone::{FittedTone, Pixel};
 
 /// Brings scene light, cd/m², of a picture this wide to linear display RGB.
-pub(super) type Mapping = fn(&dyn FittedTone, usize, &[[f32; 3]]) -> Vec<[f32; 3]>;
+pub type Mapping = fn(&dyn FittedTone, usize, &[[f32; 3]]) -> Vec<[f32; 3]>;
 
 /// Share of the display's white from which a grey is shown as white: some operators only approach it.
 const NEARLY_WHITE: f32 = 0.98;
@@ -20,11 +19,15 @@ const LEAST_GAIN: f32 = 1e-5;
 /// Around the pixel nearest to a soft edge that is covered whole its lamp is looked for so many pixels far: our widest filter, of radius 2, mixes
 /// what is up to 4 apart, so that between a lamp and what stands beside it the nearest may be of either.
 const EDGE_PIXELS: usize = 4;
-/// Above the lamp's light an edge becomes a flame over so many stops: at once, noise and rounding would put specks of white on soft edges.
-const STOPS_FROM_EDGE_TO_FLAME: f32 = 1.0;
+/// A soft edge is up to so many times as bright as the lamp that it ends at, a quarter of a stop: an edge has noise of its own, and more of the
+/// sky than what lies behind it. Alphas of 219 on a table's edge became 244.
+const EDGE_OVER_LAMP: f32 = 1.189_207_1;
+/// Above that light an edge becomes a flame over so many stops: at once, noise and rounding would put specks of white on soft edges.
+const STOPS_FROM_EDGE_TO_FLAME: f32 = 0.75;
 
 /// What is shown of a picture with alpha.
-pub(super) struct Covered<'a> {
+#[derive(Debug)]
+pub struct Covered<'a> {
     /// Linear display RGB, 0 to 1, of what covers each pixel, not multiplied by alpha.
     straight: Vec<[f32; 3]>,
     /// How much of each pixel is covered.
@@ -35,25 +38,19 @@ pub(super) struct Covered<'a> {
 
 impl<'a> Covered<'a> {
     /// Of a picture in cd/m² that is multiplied by its alpha.
-    pub(super) fn of(
-        fitted: &dyn FittedTone,
-        map: Mapping,
-        width: usize,
-        rgb_cd_m2: &[[f32; 3]],
-        alpha: &'a [f32],
-    ) -> Self {
+    pub fn of(fitted: &dyn FittedTone, map: Mapping, width: usize, rgb_cd_m2: &[[f32; 3]], alpha: &'a [f32]) -> Self {
         let straight = map(fitted, width, &divided_by_alpha(rgb_cd_m2, alpha));
         let beyond = beyond(fitted, map, width, rgb_cd_m2, alpha, &straight);
         Self { straight, alpha, beyond }
     }
 
     /// Whether any pixel has light in front of what covers it.
-    pub(super) fn has_light_in_front(&self) -> bool {
+    pub fn has_light_in_front(&self) -> bool {
         !self.beyond.is_empty()
     }
 
     /// Display RGB multiplied by alpha.
-    pub(super) fn premultiplied(&self) -> Vec<[f32; 3]> {
+    pub fn premultiplied(&self) -> Vec<[f32; 3]> {
         let mut shown: Vec<[f32; 3]> =
             self.straight.iter().zip(self.alpha).map(|(rgb, alpha)| rgb.map(|light| light * alpha)).collect();
         self.beyond.iter().for_each(|&(pixel, light)| shown[pixel] = light);
@@ -61,7 +58,7 @@ impl<'a> Covered<'a> {
     }
 
     /// Display RGB that is not multiplied, and an alpha that is just large enough to hold all light.
-    pub(super) fn straight(&self) -> (Vec<[f32; 3]>, Vec<f32>) {
+    pub fn straight(&self) -> (Vec<[f32; 3]>, Vec<f32>) {
         let (mut shown, mut alpha) = (self.straight.clone(), self.alpha.to_vec());
         for &(pixel, light) in &self.beyond {
             let held = largest(light).max(alpha[pixel]);
@@ -70,6 +67,12 @@ impl<'a> Covered<'a> {
         }
         (shown, alpha)
     }
+}
+
+/// Light of what covers each pixel, for a picture that is multiplied by its alpha: none where nothing does.
+fn divided_by_alpha(rgb: &[[f32; 3]], alpha: &[f32]) -> Vec<[f32; 3]> {
+    let scale = |alpha: f32| if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
+    rgb.iter().zip(alpha).map(|(rgb, &alpha)| rgb.map(|value| value * scale(alpha))).collect()
 }
 
 /// The pixels with more light than `straight` times alpha holds, and that light.
@@ -87,7 +90,7 @@ fn beyond(
     let mut covering_cd_m2 = rgb_cd_m2.to_vec();
     let mut pixels = Vec::new();
     for (i, (rgb, &alpha)) in covering_cd_m2.iter_mut().zip(alpha).enumerate() {
-        let lamp_cd_m2 = brightest_cd_m2[i];
+        let lamp_cd_m2 = EDGE_OVER_LAMP * brightest_cd_m2[i];
         if largest(*rgb) <= alpha * lamp_cd_m2 || edges[i] {
             continue;
         }
@@ -125,7 +128,8 @@ fn edges(width: usize, rgb_cd_m2: &[[f32; 3]], alpha: &[f32]) -> Vec<bool> {
     (0..alpha.len()).map(is_edge).collect()
 }
 
-/// Light of what covers a pixel that is brighter than white and than the lamp nearby: white, but the lamp's own where that is hardly darker.
+/// Light of what covers a pixel that is brighter than white and than the lamp nearby: white, but as bright as its edge may be
+/// where that is hardly darker.
 fn covering_light(white_cd_m2: f32, lamp_cd_m2: f32, straight_cd_m2: f32) -> f32 {
     if lamp_cd_m2 <= white_cd_m2 {
         return white_cd_m2;
@@ -232,6 +236,22 @@ mod tests {
                 let before = map_picture(fitted.as_ref(), 8, &divided_by_alpha(&rgb, &alpha));
                 assert!(!covered.has_light_in_front(), "{name}: {:?}", covered.beyond);
                 assert_eq!(covered.straight(), (before, alpha.to_vec()), "{name}");
+            }
+        }
+    }
+
+    /// An edge is a little brighter than what lies behind it, of a lamp that is shown as white as of one that nearly is, and stays an edge.
+    #[test]
+    fn edges_that_are_a_little_brighter_stay_as_they_are() {
+        let alpha = [1.0, 0.86, 0.5, 0.2];
+        for name in tone::operator_names() {
+            let fitted = fitted(name);
+            let white_cd_m2 = white_cd_m2(fitted.as_ref(), Pixel { x: 0, y: 0 }, 1e6).expect("white");
+            for lamp_cd_m2 in [0.95, 1.05, 20.0].map(|times| times * white_cd_m2) {
+                let edge_cd_m2 = 1.15 * lamp_cd_m2;
+                let light = alpha.map(|alpha| if alpha < 1.0 { alpha * edge_cd_m2 } else { lamp_cd_m2 });
+                let covered = Covered::of(fitted.as_ref(), map_picture, 4, &light.map(|light| [light; 3]), &alpha);
+                assert!(!covered.has_light_in_front(), "{name}, {lamp_cd_m2} cd/m²: {:?}", covered.beyond);
             }
         }
     }
