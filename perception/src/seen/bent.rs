@@ -1,7 +1,7 @@
 //! Noise of colour through an operator that bends or clips each channel by itself, where a tint's noise is another matter on a colour
 //! than on a grey, and greys of a luminance say nothing of it.
 
-use super::shown::{Noise, Shown, variances_of_tints};
+use super::shown::{Noise, Shown, variances_of_opponent};
 use crate::opponent::{OPPONENT_OF_RGB, opponent};
 use crate::primaries::{IDENTITY, inverse};
 use crate::tone::Pixel;
@@ -37,7 +37,7 @@ pub(super) fn variances_of_colour(
     let share_of_hue = if all > 0.0 { (explained / all) as f32 } else { 1.0 };
 
     let (noisy, points) = shown.coloured_pixel(pixel, noise, hue);
-    let along_hue = points.map_or([0.0; 2], |points| variances_of_tints(&points, noise));
+    let along_hue = points.map_or([0.0; 3], |points| variances_of_opponent(&points, noise));
     let along_grey = if share_of_hue < MOSTLY { shown.variances_along_grey(pixel, noise, hue) } else { [0.0; 3] };
     let mixed = |of_hue: f32, of_grey: f32| {
         if share_of_hue < MOSTLY { share_of_hue * of_hue + (1.0 - share_of_hue) * of_grey } else { of_hue }
@@ -49,8 +49,8 @@ pub(super) fn variances_of_colour(
     };
     [
         mixed(noisy.variance(), along_grey[0]),
-        mixed(along_hue[0], along_grey[1]) + beside(0),
-        mixed(along_hue[1], along_grey[2]) + beside(1),
+        mixed(along_hue[1], along_grey[1]) + beside(0),
+        mixed(along_hue[2], along_grey[2]) + beside(1),
     ]
 }
 

@@ -75,9 +75,7 @@ impl Shown<'_> {
             let grey = scene - noise.mean;
             self.opponent(pixel, hue.map(|channel| (noise.mean * f64::from(channel) + grey).max(0.0) as f32))
         };
-        let Some(shown) = Points::of(noise, light) else { return [0.0; 3] };
-        let [red_green, yellow_violet] = variances_of_tints(&shown, noise);
-        [shown.variance(noise, |shown| shown.achromatic) as f32, red_green, yellow_violet]
+        Points::of(noise, light).map_or([0.0; 3], |shown| variances_of_opponent(&shown, noise))
     }
 
     fn relative(&self, pixel: Pixel, scene_cd_m2: f64) -> f32 {
@@ -118,6 +116,8 @@ pub(super) struct Points<T> {
     above: f64,
     /// Below, at and above the mean.
     shown: [T; 3],
+    /// At a standard deviation above it, where few samples bring the light.
+    of_few: Option<T>,
 }
 
 impl<T: Copy> Points<T> {
@@ -127,19 +127,38 @@ impl<T: Copy> Points<T> {
         let gauss = noise.gauss();
         let (below, above) = if noise.is_normal() { (gauss, gauss) } else { (mean, (3.0 * variance / mean).min(1e30)) };
         let has_points = below > 0.0 && above.is_finite();
-        has_points.then(|| Self { below, above, shown: [mean - below, mean, mean + above].map(shown) })
+        has_points.then(|| Self {
+            below,
+            above,
+            of_few: (!noise.is_normal()).then(|| shown(mean + noise.deviation())),
+            shown: [mean - below, mean, mean + above].map(shown),
+        })
     }
 
     fn map<U>(self, to: impl Fn(T) -> U) -> Points<U> {
-        Points { below: self.below, above: self.above, shown: self.shown.map(to) }
+        let Self { below, above, shown, of_few } = self;
+        Points { below, above, of_few: of_few.map(&to), shown: shown.map(to) }
     }
 
-    /// Variance of something that is shown. `noise`: of which these are the points.
-    pub(super) fn variance(&self, noise: Noise, of: impl Fn(T) -> f32) -> f64 {
+    /// Variance of something that is shown, by these points alone. `noise`: of which they are.
+    fn spread(&self, noise: Noise, of: impl Fn(T) -> f32) -> f64 {
         let Self { below, above, .. } = *self;
         let outer = [below, above].map(|distance| noise.variance / (distance * (below + above)));
         let weights = [outer[0], 1.0 - outer[0] - outer[1], outer[1]];
         variance_of(weights.into_iter().zip(self.shown.map(|shown| f64::from(of(shown)))))
+    }
+
+    /// Variance of something that is shown, of which half is what a standard deviation shows where few samples bring the light: see
+    /// [`super::display_variance`].
+    fn variance(&self, noise: Noise, of: impl Fn(T) -> f32) -> f64 {
+        let spread = self.spread(noise, &of);
+        match self.of_few {
+            None => spread,
+            Some(of_few) => {
+                let swing = f64::from(of(of_few)) - f64::from(of(self.shown[1]));
+                0.5 * (spread + swing * swing)
+            }
+        }
     }
 }
 
@@ -150,11 +169,13 @@ fn variance_of(weighted: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
     weighted.map(|(weight, value)| weight * (value - mean) * (value - mean)).sum::<f64>() / total
 }
 
-/// Variances of red–green and yellow–violet, (cd/m²)², of a colour whose luminance is noisy.
-pub(super) fn variances_of_tints(shown: &Points<Opponent>, noise: Noise) -> [f32; 2] {
-    [|shown: Opponent| shown.red_green, |shown: Opponent| shown.yellow_violet]
-        .map(|signal| shown.variance(noise, signal) as f32)
+/// Variances of luminance, red–green and yellow–violet, (cd/m²)², of a colour whose light is noisy.
+pub(super) fn variances_of_opponent(shown: &Points<Opponent>, noise: Noise) -> [f32; 3] {
+    OPPONENT_SIGNALS.map(|signal| shown.variance(noise, signal) as f32)
 }
+
+const OPPONENT_SIGNALS: [fn(Opponent) -> f32; 3] =
+    [|shown| shown.achromatic, |shown| shown.red_green, |shown| shown.yellow_violet];
 
 /// A pixel with noisy light behind operator and display.
 pub(super) struct NoisyPixel<'a> {
@@ -169,8 +190,7 @@ pub(super) struct NoisyPixel<'a> {
 impl NoisyPixel<'_> {
     /// Variance of the displayed luminance, (cd/m²)²: see [`super::display_variance`].
     pub(super) fn variance(&self) -> f32 {
-        let Noise { mean, variance } = self.noise;
-        if variance <= 0.0 {
+        if self.noise.variance <= 0.0 {
             return 0.0;
         }
         let Some(points) = &self.points else {
@@ -181,13 +201,7 @@ impl NoisyPixel<'_> {
         if self.noise.is_normal() && self.clip_is_in_reach(points.shown) {
             return self.clipped_variance();
         }
-        let shown = points.map(|relative| self.shown.emitted_cd_m2(relative));
-        let spread = shown.variance(self.noise, |cd_m2| cd_m2);
-        if self.noise.is_normal() {
-            return spread as f32;
-        }
-        let swing = self.cd_m2(mean + variance.sqrt()) - f64::from(shown.shown[1]);
-        (0.5 * (spread + swing * swing)) as f32
+        points.variance(self.noise, |relative| self.shown.emitted_cd_m2(relative)) as f32
     }
 
     /// How much of the variances of both chromatic signals, `unbounded` (cd/m²)², fits the display: at most the square of the room that each
@@ -232,7 +246,8 @@ impl NoisyPixel<'_> {
             return [0.0; 2];
         }
         let (_, shown) = self.shown.coloured_pixel(self.pixel, self.noise, rgb.map(|channel| channel / strength));
-        shown.map_or([0.0; 2], |shown| variances_of_tints(&shown, self.noise))
+        let [_, red_green, yellow_violet] = OPPONENT_SIGNALS;
+        shown.map_or([0.0; 2], |shown| [red_green, yellow_violet].map(|signal| shown.spread(self.noise, signal) as f32))
     }
 
     /// Whether normal noise reaches over a clip of the display. `relative`: below, at and above the mean.

@@ -86,9 +86,9 @@ mod tests {
 
     #[test]
     fn luminance_is_that_of_the_picture_shown() {
-        let colours = [[0.02, 0.05, 3.0], [0.7, 0.1, 0.2]];
+        let colours = [[0.02, 0.05, 3.0], [0.7, 0.1, 0.2], [-0.588, 1.133, -0.101]];
         for name in ["srgb", "linear", "agx", "pbr-neutral", "absolute", "reinhard02"] {
-            let shown = coloured(fit(name), 2, &colours);
+            let shown = coloured(fit(name), 3, &colours);
             for (x, colour) in colours.into_iter().enumerate() {
                 for scene in [0.01_f32, 1.0, 30.0, 200.0, 3000.0] {
                     let pixel = Pixel { x, y: 0 };
