@@ -155,7 +155,7 @@ impl<'a> NoiseShown<'a> {
     /// two. One is what the operator leaves of tints, as far as there is room for them below the display's white, where every colour is
     /// white; nothing is taken off at black, whose tints are small by themselves. The other is what becomes of a `colour` that fits the
     /// display less, the brighter it is: red at half of white's luminance pales with each step towards it. An operator that knows the
-    /// picture's colours ([`crate::tone::coloured`]) is asked what it makes of them with noise.
+    /// picture's colours ([`crate::tone::coloured()`]) is asked what it makes of them with noise.
     ///
     /// What is not finite, or of negative variance, gets infinity; colour also where luminance's variance is so.
     #[must_use]

@@ -136,7 +136,7 @@ const LEAST_GREY_CD_M2: f32 = 1e-6;
 ///
 /// There are those of this crate and no others: each can be kept with a picture, as one of the kinds that a [`SavedTone`] holds.
 pub trait FittedTone: Send + Sync + Debug {
-    /// Linear display light for a grey of scene luminance `scene_cd_m2` at `pixel`, or for the pixel's own colour ([`coloured`]): 0 is the
+    /// Linear display light for a grey of scene luminance `scene_cd_m2` at `pixel`, or for the pixel's own colour ([`coloured()`]): 0 is the
     /// display's black, 1 its white.
     ///
     /// May exceed 1, which the display then clips; never NaN, never falls as its argument rises. NaN counts as black.
@@ -179,12 +179,12 @@ pub trait FittedTone: Send + Sync + Debug {
     }
 
     /// Whether every colour is shown as bright as a grey of its luminance, and so as white where that is. Not where each channel is bent
-    /// or clipped by itself: a blue of any luminance stays blue ([`coloured`]).
+    /// or clipped by itself: a blue of any luminance stays blue ([`coloured()`]).
     fn keeps_luminance(&self) -> bool {
         true
     }
 
-    /// The operator itself, where this one knows the colours of a picture ([`coloured`]): for light of other colours.
+    /// The operator itself, where this one knows the colours of a picture ([`coloured()`]): for light of other colours.
     fn without_colours(&self) -> Option<&dyn FittedTone> {
         None
     }
