@@ -224,6 +224,7 @@ pub fn find_outliers(film: &Film) -> Outliers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::adaptive::test_films::film_of_halves;
     use crate::film::BlockSum;
     use crate::integrator::{BlockWork, PathSample};
     use glam::Vec3;
@@ -271,6 +272,19 @@ mod tests {
         assert!((factor - 1.0).abs() < 0.1, "{factor}");
         let excess = mean(&for_half(&film, Half::A)) / mean(&statistics.luminance().pooled);
         assert!(excess < 1.05, "maximum of pooled and own spends {excess}");
+    }
+
+    /// Halves that differ by far more than their scatter tells are believed up to 1.2 times it, and up to what is asked for as displayed.
+    #[test]
+    fn halves_are_believed_up_to_a_factor() {
+        let grey = |half: Half, random: f32| Vec3::splat(0.1 * random + if half == Half::A { 1.0 } else { 3.0 });
+        let film = film_of_halves([8; 2], |_| false, |_, half, random| grey(half, random));
+        let scale = scene_units(&film);
+        let like = |value: f32| std::array::from_fn(|_| scale[0].map(|_| value));
+        let difference = DifferenceOnDisplay { squared: like(1.0), expected: like(0.01), most_factor: 4.0 };
+        let factor = |statistics: &SampleStatistics| statistics.luminance().low_discrepancy_factor.mean();
+        assert!((factor(&SampleStatistics::of(&film, &scale)) - f64::from(MOST_FACTOR)).abs() < 1e-6);
+        assert_eq!(factor(&SampleStatistics::of_displayed(&film, &scale, &difference)), 4.0);
     }
 
     /// A hard pixel among easy ones is seen through the other half, and does not hide in the pool.

@@ -396,7 +396,7 @@ mod tests {
         let own = &evidence[pixel][channel];
         let with_own = (squared + own.squared_difference) / (expected + own.expected_difference);
         let drawn = most * (6.0 * most / expected).min(1.0);
-        [variance / weights, ((squared + drawn) / (expected + drawn)).clamp(0.02, 1.2), with_own]
+        [variance / weights, ((squared + drawn) / (expected + drawn)).max(0.02), with_own]
     }
 
     /// By rows and in planes comes out what the definition says, at borders too.
