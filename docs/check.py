@@ -1,11 +1,13 @@
 """Do the documents hold what they promise?
 
-    python3 docs/check.py                          # every relative link of every Markdown file leads to a file and, after #, to a heading
+    python3 docs/check.py                          # every relative link of every Markdown file leads to a file and, after #, to a heading,
+                                                   # and no paragraph or heading stands in a file twice
     python3 docs/check.py target/release/fechner   # and every example of docs/commands.md runs, in a copy of the scenes: a minute and a half
 
 Nothing to install. Exit status 1 names what does not hold.
 """
 
+import collections
 import json
 import os
 import pathlib
@@ -44,6 +46,18 @@ def broken_links():
                 yield f"{document.relative_to(ROOT)}: {link}: no such file"
             elif anchor and anchor not in anchors(target):
                 yield f"{document.relative_to(ROOT)}: {link}: no such heading"
+
+
+def repeated():
+    """Paragraphs and headings that a file has twice. An entry of a list or a table may say no more than another."""
+    for document in documents():
+        prose = CODE.sub("", document.read_text(encoding="utf-8"))
+        blocks = [block.strip() for block in re.split(r"\n\s*\n", prose)]
+        titles = [block for block in blocks if block.startswith("## ")]
+        paragraphs = [block for block in blocks if len(block) > 80 and not block.startswith(("#", "-", "|"))]
+        for block, times in collections.Counter(titles + paragraphs).items():
+            if times > 1:
+                yield f"{document.relative_to(ROOT)}: {block.splitlines()[0]}: stands there {times} times"
 
 
 def fields(figures):
@@ -95,7 +109,7 @@ def failing_examples(program):
 
 
 def main():
-    problems = list(broken_links())
+    problems = [*broken_links(), *repeated()]
     if len(sys.argv) > 1:
         problems += failing_examples(sys.argv[1])
     print("\n".join(problems) or "the documents hold")
