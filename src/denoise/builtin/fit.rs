@@ -2,7 +2,8 @@
 //!
 //! Loops, not closures: what a tile's work calls must be inlined to be compiled for wide vectors (see [`with_vectors`]).
 
-use super::likeness::{Likeness, TileWeights};
+use super::lanes::{LANES, Lanes};
+use super::likeness::{Likeness, Scratch, TileWeights};
 use super::planes::{PaddedPlane, TILE};
 use super::taps::Tap;
 use crate::geometry::{VectorWork, with_vectors};
@@ -10,9 +11,9 @@ use rayon::prelude::*;
 
 /// Albedo, normal, depth.
 pub(super) const FEATURES: usize = 7;
-/// Pixels that are fitted at once.
-const LANES: usize = 8;
 const _: () = assert!(TILE.is_multiple_of(LANES), "a tile's rows are whole groups");
+/// Neighbours that a fit by features takes at once: its 60 sums do not fit into registers, and are read and written once for all of these.
+const AT_ONCE: usize = 4;
 /// Neighbours of less weight are passed over.
 const LEAST_WEIGHT: f32 = 1e-4;
 /// Variance of a sample's feature, about: what a fit follows may be the features' own noise, which is this over the samples.
@@ -50,77 +51,6 @@ pub(super) fn by_place<const PATCH: usize>(
     by_tiles(likeness, &ByPlace { colours })
 }
 
-/// A value for each of the pixels that are fitted at once.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Lanes([f32; LANES]);
-
-impl Lanes {
-    const ZERO: Self = Self([0.0; LANES]);
-    const ONE: Self = Self([1.0; LANES]);
-
-    /// Of a plane, from a place on.
-    #[inline(always)]
-    fn of(plane: &PaddedPlane, place: Place) -> Self {
-        Self(*plane.row(place.y, place.x))
-    }
-
-    #[inline(always)]
-    fn add_product(&mut self, a: Self, b: Self) {
-        for i in 0..LANES {
-            self.0[i] += a.0[i] * b.0[i];
-        }
-    }
-
-    #[inline(always)]
-    fn subtract_product(&mut self, a: Self, b: Self) {
-        for i in 0..LANES {
-            self.0[i] -= a.0[i] * b.0[i];
-        }
-    }
-
-    #[inline(always)]
-    fn times(mut self, other: Self) -> Self {
-        for i in 0..LANES {
-            self.0[i] *= other.0[i];
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn less(mut self, other: Self) -> Self {
-        for i in 0..LANES {
-            self.0[i] -= other.0[i];
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn over(mut self, other: Self) -> Self {
-        for i in 0..LANES {
-            self.0[i] /= other.0[i];
-        }
-        self
-    }
-
-    /// Each at least this.
-    #[inline(always)]
-    fn at_least(mut self, least: f32) -> Self {
-        for i in 0..LANES {
-            self.0[i] = self.0[i].max(least);
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn any_is_at_least(self, least: f32) -> bool {
-        let mut is_any = false;
-        for i in 0..LANES {
-            is_any |= self.0[i] >= least;
-        }
-        is_any
-    }
-}
-
 /// Where the first of the pixels that are fitted at once is.
 #[derive(Clone, Copy)]
 struct Place {
@@ -133,6 +63,12 @@ impl Place {
     fn at(self, tap: Tap) -> Self {
         Self { y: self.y + tap.dy, x: self.x + tap.dx }
     }
+}
+
+/// Of a plane, from a place on.
+#[inline(always)]
+fn at_place(plane: &PaddedPlane, place: Place) -> Lanes {
+    Lanes(*plane.row(place.y, place.x))
 }
 
 /// `N` values of pixels from their neighbours.
@@ -171,20 +107,31 @@ impl FromNeighbours<4> for ByFeatures<'_> {
     fn values(&self, place: Place, neighbours: &Neighbours<'_>) -> [Lanes; 4] {
         let mut centers = [Lanes::ZERO; FEATURES];
         for (center, plane) in centers.iter_mut().zip(self.features) {
-            *center = Lanes::of(plane, place);
+            *center = at_place(plane, place);
         }
         let mut equations = Equations::<{ FEATURES + 1 }>::new();
         let (mut variance, mut total) = (Lanes::ZERO, Lanes::ZERO);
+        let mut seen = [Neighbour::<{ FEATURES + 1 }>::NONE; AT_ONCE];
+        let mut waiting = 0;
         for (number, &tap) in neighbours.taps.iter().enumerate() {
             let Some(weight) = neighbours.weight(number) else { continue };
             let at = place.at(tap);
-            let mut terms = [Lanes::ONE; FEATURES + 1];
-            for i in 0..FEATURES {
-                terms[i] = Lanes::of(&self.features[i], at).less(centers[i]);
+            let neighbour = &mut seen[waiting];
+            neighbour.weight = weight;
+            for ((term, plane), &center) in neighbour.terms.iter_mut().zip(self.features).zip(&centers) {
+                *term = at_place(plane, at).less(center);
             }
-            equations.add(weight, &terms, colours_at(self.colours, at));
+            neighbour.colours = colours_at(self.colours, at);
             total.add_product(weight, Lanes::ONE);
-            variance.add_product(weight.times(weight), Lanes::of(neighbours.variance, at));
+            variance.add_product(weight.times(weight), at_place(neighbours.variance, at));
+            waiting += 1;
+            if waiting == AT_ONCE {
+                equations.add(&seen);
+                waiting = 0;
+            }
+        }
+        for neighbour in seen.iter().take(waiting) {
+            equations.add(std::array::from_ref(neighbour));
         }
         let [red, green, blue] = equations.value_at_center(self.ridge);
         [red, green, blue, variance.over(total.times(total))]
@@ -202,7 +149,7 @@ impl FromNeighbours<3> for ByPlace<'_> {
         for (number, &tap) in neighbours.taps.iter().enumerate() {
             let Some(weight) = neighbours.weight(number) else { continue };
             let terms = [Lanes([tap.dx as f32; LANES]), Lanes([tap.dy as f32; LANES]), Lanes::ONE];
-            equations.add(weight, &terms, colours_at(self.colours, place.at(tap)));
+            equations.add(&[Neighbour { weight, terms, colours: colours_at(self.colours, place.at(tap)) }]);
         }
         equations.value_at_center(PLACE_RIDGE)
     }
@@ -211,7 +158,7 @@ impl FromNeighbours<3> for ByPlace<'_> {
 #[inline(always)]
 fn colours_at(colours: &[PaddedPlane; 3], place: Place) -> [Lanes; 3] {
     let [red, green, blue] = colours;
-    [Lanes::of(red, place), Lanes::of(green, place), Lanes::of(blue, place)]
+    [at_place(red, place), at_place(green, place), at_place(blue, place)]
 }
 
 /// Runs a fit over the picture, `N` values for each pixel.
@@ -222,10 +169,10 @@ fn by_tiles<const N: usize, const PATCH: usize>(
     let (width, height) = likeness.surfaces.size();
     let mut found = vec![[0.0; N]; width * height];
     found.par_chunks_mut(TILE * width).enumerate().for_each_init(
-        || vec![[[0.0; TILE]; TILE]; likeness.taps.all().len()],
-        |weights, (tile_y, rows)| {
+        || (vec![[[0.0; TILE]; TILE]; likeness.taps.all().len()], Box::<Scratch>::default()),
+        |(weights, scratch), (tile_y, rows)| {
             for x in (0..width).step_by(TILE) {
-                with_vectors(TileWork { likeness, fit, weights, y: tile_y * TILE, x, rows, width });
+                with_vectors(TileWork { likeness, fit, weights, scratch, y: tile_y * TILE, x, rows, width });
             }
         },
     );
@@ -238,6 +185,7 @@ struct TileWork<'a, F, const N: usize, const PATCH: usize> {
     fit: &'a F,
     /// Room for the weights of each tap.
     weights: &'a mut [TileWeights],
+    scratch: &'a mut Scratch,
     /// The first row and column.
     y: usize,
     x: usize,
@@ -252,7 +200,7 @@ impl<F: FromNeighbours<N>, const N: usize, const PATCH: usize> VectorWork for Ti
     fn run(self) {
         let taps = self.likeness.taps.all();
         for (weights, &tap) in self.weights.iter_mut().zip(taps) {
-            self.likeness.weigh(self.y as isize, self.x as isize, tap, weights);
+            self.likeness.weigh(self.y as isize, self.x as isize, tap, self.scratch, weights);
         }
         for (row, pixels) in self.rows.chunks_exact_mut(self.width).enumerate() {
             let end = self.width.min(self.x + TILE);
@@ -278,6 +226,19 @@ impl<F: FromNeighbours<N>, const N: usize, const PATCH: usize> VectorWork for Ti
     }
 }
 
+/// What a tap finds for each of the pixels that are fitted at once.
+#[derive(Clone, Copy)]
+struct Neighbour<const UNKNOWNS: usize> {
+    weight: Lanes,
+    /// Relative to the pixel, so that it is where they are 0; the last is 1.
+    terms: [Lanes; UNKNOWNS],
+    colours: [Lanes; 3],
+}
+
+impl<const UNKNOWNS: usize> Neighbour<UNKNOWNS> {
+    const NONE: Self = Self { weight: Lanes::ZERO, terms: [Lanes::ONE; UNKNOWNS], colours: [Lanes::ZERO; 3] };
+}
+
 /// Normal equations of several pixels' fits, the constant last.
 struct Equations<const UNKNOWNS: usize> {
     /// The upper triangle.
@@ -291,16 +252,27 @@ impl<const UNKNOWNS: usize> Equations<UNKNOWNS> {
         Self { matrix: [[Lanes::ZERO; _]; _], right: [[Lanes::ZERO; _]; _] }
     }
 
-    /// `terms` are relative to the pixel, so that it is where they are 0; the last is 1.
+    /// One after the other, so that it makes no difference to a sum how many come at once.
     #[inline(always)]
-    fn add(&mut self, weight: Lanes, terms: &[Lanes; UNKNOWNS], colours: [Lanes; 3]) {
+    fn add<const NEIGHBOURS: usize>(&mut self, neighbours: &[Neighbour<UNKNOWNS>; NEIGHBOURS]) {
         for i in 0..UNKNOWNS {
-            let weighted = weight.times(terms[i]);
-            for (sum, &term) in self.matrix[i][i..].iter_mut().zip(&terms[i..]) {
-                sum.add_product(weighted, term);
+            let mut weighted = [Lanes::ZERO; NEIGHBOURS];
+            for (weighted, neighbour) in weighted.iter_mut().zip(neighbours) {
+                *weighted = neighbour.weight.times(neighbour.terms[i]);
             }
-            for (sum, &colour) in self.right[i].iter_mut().zip(&colours) {
-                sum.add_product(weighted, colour);
+            for j in i..UNKNOWNS {
+                let mut sum = self.matrix[i][j];
+                for (&weighted, neighbour) in weighted.iter().zip(neighbours) {
+                    sum.add_product(weighted, neighbour.terms[j]);
+                }
+                self.matrix[i][j] = sum;
+            }
+            for c in 0..3 {
+                let mut sum = self.right[i][c];
+                for (&weighted, neighbour) in weighted.iter().zip(neighbours) {
+                    sum.add_product(weighted, neighbour.colours[c]);
+                }
+                self.right[i][c] = sum;
             }
         }
     }
@@ -344,7 +316,8 @@ mod tests {
             let value = 7.0 + 2.0 * dx - 3.0 * dy;
             let weight = if (dx, dy) == (0.0, 0.0) { 1.0 } else { 1.0 / (1.0 + i as f32) };
             let terms = [Lanes([dx; LANES]), Lanes([dy; LANES]), Lanes::ONE];
-            equations.add(Lanes([weight; LANES]), &terms, [Lanes([value; LANES]); 3]);
+            let colours = [Lanes([value; LANES]); 3];
+            equations.add(&[Neighbour { weight: Lanes([weight; LANES]), terms, colours }]);
         }
         let [red, ..] = equations.value_at_center(1e-6);
         assert!((red.0[0] - 7.0).abs() < 1e-3, "{red:?}");
@@ -356,7 +329,7 @@ mod tests {
         let mut equations = Equations::<8>::new();
         let mut terms = [Lanes::ZERO; 8];
         terms[7] = Lanes::ONE;
-        equations.add(Lanes::ONE, &terms, [Lanes([5.0; LANES]); 3]);
+        equations.add(&[Neighbour { weight: Lanes::ONE, terms, colours: [Lanes([5.0; LANES]); 3] }]);
         assert_eq!(equations.value_at_center(1e-6)[0], Lanes([5.0; LANES]));
     }
 }

@@ -1,6 +1,7 @@
 //! How much a neighbour counts: by its surroundings, less what noise alone would make of them, and by its surface.
 
 use super::SurfaceGuides;
+use super::lanes::{LANES, Lanes};
 use super::planes::{Beyond, PaddedPlane, TILE};
 use super::taps::{Tap, Taps};
 use fechner_perception::guide::{BEYOND, DEPTH_SLOPES, FARTHEST_SURFACE, GONE, depth_slopes};
@@ -17,9 +18,21 @@ const NO_SURFACE: f32 = 0.5 * BEYOND;
 /// About exp(−x), 0 from [`GONE`] on, without the cost of an exponential.
 #[inline(always)]
 fn falling(x: f32) -> f32 {
-    let base = (1.0 - x / GONE).max(0.0);
+    let base = positive(1.0 - x / GONE);
     let fourth = base * base * base * base;
     fourth * fourth
+}
+
+/// At least 0. `f32::max` would look for what is not a number, too, where there is none.
+#[inline(always)]
+fn positive(x: f32) -> f32 {
+    if x > 0.0 { x } else { 0.0 }
+}
+
+/// The lesser of two numbers, likewise.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// Light that falls on surfaces: luminance, and its variance.
@@ -43,6 +56,8 @@ pub(super) struct Surfaces {
     /// Columns and rows.
     size: (usize, usize),
     normal: [PaddedPlane; 3],
+    /// [`NORMAL_SHARPNESS`], 0 where there is no normal.
+    sharpness: PaddedPlane,
     depth: PaddedPlane,
     /// 1 over the difference of depth, per pixel of distance, at which a neighbour gets 1/e of the weight.
     per_depth: PaddedPlane,
@@ -64,6 +79,9 @@ impl Surfaces {
         Self {
             size: (width, height),
             normal: std::array::from_fn(|axis| PaddedPlane::new(width, height, Beyond::Edge, |i| normals[i][axis])),
+            sharpness: PaddedPlane::new(width, height, Beyond::Edge, |i| {
+                if normals[i] == [0.0; 3] { 0.0 } else { NORMAL_SHARPNESS }
+            }),
             depth: PaddedPlane::new(width, height, Beyond::Value(BEYOND), depth),
             per_depth: PaddedPlane::new(width, height, Beyond::Value(0.0), |i| per_depth(i).min(1e6)),
             shining: PaddedPlane::new(width, height, Beyond::Edge, |i| if guides.shines[i] { GONE } else { 0.0 }),
@@ -95,20 +113,31 @@ pub(super) struct Likeness<'a, const PATCH: usize> {
 
 /// Weights of one tap for a tile's pixels.
 pub(super) type TileWeights = [[f32; TILE]; TILE];
-/// The widest that a tile's neighbourhoods are.
-const WIDEST: usize = TILE + 4;
+/// Room for what is found of one tap on the way to its weights.
+#[derive(Default)]
+pub(super) struct Scratch {
+    /// Of each pixel of the tile and around it.
+    unlike: [[f32; WIDEST]; TILE + 2 * MOST_PATCH],
+    along: [[f32; TILE]; TILE + 2 * MOST_PATCH],
+}
+
+/// The most pixels to each side that are compared.
+const MOST_PATCH: usize = 2;
+/// As wide as a tile's neighbourhoods are and more, in whole vectors.
+const WIDEST: usize = TILE + 8;
 
 impl<const PATCH: usize> Likeness<'_, PATCH> {
-    const FITS: () = assert!(2 * PATCH <= WIDEST - TILE, "a patch is wider than there is room for");
+    const FITS: () = assert!(PATCH <= MOST_PATCH, "a patch is wider than there is room for");
 
     /// Weights of a tap for the pixels of the tile whose first pixel this is. Inlined, as all that it calls, for wide vectors.
     #[inline(always)]
-    pub(super) fn weigh(&self, y: isize, x: isize, tap: Tap, weights: &mut TileWeights) {
+    pub(super) fn weigh(&self, y: isize, x: isize, tap: Tap, scratch: &mut Scratch, weights: &mut TileWeights) {
         let () = Self::FITS;
-        let unlike = self.unlike_surroundings(y, x, tap);
+        self.unlike_surroundings(y, x, tap, scratch);
         // The slope explains more the farther one goes.
         let per_distance = 1.0 / tap.distance().max(1.0);
-        for row in 0..TILE {
+        for (row, weights) in weights.iter_mut().enumerate() {
+            let unlike = Self::mean_of_rows(&scratch.along, row);
             let y = y + row as isize;
             let (other_y, other_x) = (y + tap.dy, x + tap.dx);
             let [nx, ny, nz] = &self.surfaces.normal;
@@ -117,55 +146,62 @@ impl<const PATCH: usize> Likeness<'_, PATCH> {
             let depth = [self.surfaces.depth.row::<TILE>(y, x), self.surfaces.depth.row(other_y, other_x)];
             let shining = [self.surfaces.shining.row::<TILE>(y, x), self.surfaces.shining.row(other_y, other_x)];
             let per_depth = self.surfaces.per_depth.row::<TILE>(y, x);
+            let sharpness = self.surfaces.sharpness.row::<TILE>(y, x);
             for i in 0..TILE {
-                let has_normal = own[0][i].abs() + own[1][i].abs() + own[2][i].abs();
                 let cosine = own[0][i] * other[0][i] + own[1][i] * other[1][i] + own[2][i] * other[2][i];
-                let turned = if has_normal > 0.0 { NORMAL_SHARPNESS * (1.0 - cosine).max(0.0) } else { 0.0 };
+                let turned = sharpness[i] * positive(1.0 - cosine);
                 let apart = (depth[0][i] - depth[1][i]).abs() * per_depth[i] * per_distance;
-                weights[row][i] = falling(unlike[row][i] + turned + apart + (shining[0][i] - shining[1][i]).abs());
+                weights[i] = falling(unlike[i] + turned + apart + (shining[0][i] - shining[1][i]).abs());
             }
         }
     }
 
-    /// Mean over the pixels around of their squared difference from those around the neighbour, less what noise makes of it on
-    /// average, in units of the tolerance: 0 where it is no more than noise.
+    /// How the pixels around differ from those around the neighbour, squared, less what noise makes of it on average, in units of the
+    /// tolerance: summed along rows.
     #[inline(always)]
-    fn unlike_surroundings(&self, y: isize, x: isize, tap: Tap) -> TileWeights {
+    fn unlike_surroundings(&self, y: isize, x: isize, tap: Tap, scratch: &mut Scratch) {
         let patch = PATCH as isize;
-        let side = 2 * PATCH + 1;
         let squared_tolerance = self.tolerance * self.tolerance;
-        let mut along = [[0.0_f32; TILE]; WIDEST];
-        for (row, along) in along.iter_mut().enumerate().take(TILE + 2 * PATCH) {
+        for (row, unlike) in scratch.unlike.iter_mut().enumerate().take(TILE + 2 * PATCH) {
             let (y, x) = (y + row as isize - patch, x - patch);
             let (other_y, other_x) = (y + tap.dy, x + tap.dx);
             let own = self.light.luminance.row::<WIDEST>(y, x);
             let other = self.light.luminance.row::<WIDEST>(other_y, other_x);
             let own_variance = self.light.variance.row::<WIDEST>(y, x);
             let other_variance = self.light.variance.row::<WIDEST>(other_y, other_x);
-            let mut unlike = [0.0_f32; WIDEST];
             for i in 0..WIDEST {
                 let difference = own[i] - other[i];
                 let a = own_variance[i];
-                let b = other_variance[i].min(self.most_variance_ratio * a);
+                let b = lesser(other_variance[i], self.most_variance_ratio * a);
                 // Of a neighbour that is noisier than the pixel no more is taken off than the pixel's own: Rousselle et al. 2012, eq. 3.
-                unlike[i] = (difference * difference - (a + a.min(b))) / (squared_tolerance * (a + b));
-            }
-            for step in 0..side {
-                for i in 0..TILE {
-                    along[i] += unlike[i + step];
-                }
+                unlike[i] = (difference * difference - (a + lesser(a, b))) / (squared_tolerance * (a + b));
             }
         }
-        let share = 1.0 / (side * side) as f32;
-        let mut mean = [[0.0_f32; TILE]; TILE];
-        for (row, mean) in mean.iter_mut().enumerate() {
-            for along in &along[row..row + side] {
-                for i in 0..TILE {
-                    mean[i] += along[i];
+        // Only now: what is read right after it was written, from another column on, has to wait.
+        for (along, unlike) in scratch.along.iter_mut().zip(&scratch.unlike).take(TILE + 2 * PATCH) {
+            for column in (0..TILE).step_by(LANES) {
+                let mut sum = Lanes::of(unlike, column);
+                for step in 1..=2 * PATCH {
+                    sum.add(Lanes::of(unlike, column + step));
                 }
+                along[column..column + LANES].copy_from_slice(&sum.0);
             }
-            for value in mean {
-                *value = (*value * share).max(0.0);
+        }
+    }
+
+    /// The mean over a row's pixels' surroundings of what sums along rows say: 0 where it is no more than noise.
+    #[inline(always)]
+    fn mean_of_rows(along: &[[f32; TILE]], row: usize) -> [f32; TILE] {
+        let side = 2 * PATCH + 1;
+        let share = 1.0 / (side * side) as f32;
+        let mut mean = [0.0; TILE];
+        for column in (0..TILE).step_by(LANES) {
+            let mut sum = Lanes::of(&along[row], column);
+            for below in 1..side {
+                sum.add(Lanes::of(&along[row + below], column));
+            }
+            for i in 0..LANES {
+                mean[column + i] = positive(sum.0[i] * share);
             }
         }
         mean

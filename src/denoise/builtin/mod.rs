@@ -9,6 +9,7 @@
 //! Not for a picture without surfaces: glass and mirrors are filtered by what the first surface says, and by what they show.
 
 mod fit;
+mod lanes;
 mod likeness;
 mod planes;
 mod taps;

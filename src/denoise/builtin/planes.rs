@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 /// Pixels to a tile's side: work is done by tiles, whose sums stay in the first cache.
 pub(super) const TILE: usize = 16;
-/// Pixels beyond the picture that may be read: the farthest neighbour's neighbourhood.
-pub(super) const BORDER: usize = FARTHEST + 4;
+/// Pixels beyond the picture that may be read: the farthest neighbour's neighbourhood, in whole vectors.
+pub(super) const BORDER: usize = FARTHEST + 8;
 
 /// What is read beyond the picture.
 #[derive(Clone, Copy)]
