@@ -76,8 +76,16 @@ pub(in crate::scene::load::toml) fn most_cuts(moving: usize) -> u32 {
 
 impl Keyframes<ObjectKey> {
     fn pose(&self, time: f64) -> Pose {
+        /// Of the way between two keyframes.
+        const BESIDE: f32 = 1e-4;
         let Between { before, after, share } = self.around(time);
-        before.interpolate(after, share)
+        let pose = before.interpolate(after, share);
+        // A scale that changes its sign, or grows out of next to nothing, is flat for a moment, at which no ray can be brought to the object: it
+        // was missing for all the time of a shutter that opens then.
+        if pose.stretch.determinant() != 0.0 {
+            return pose;
+        }
+        before.interpolate(after, if share < 0.5 { share + BESIDE } else { share - BESIDE })
     }
 
     /// Whether spheres placed by `before` stay spheres at all times. Between two keyframes the stretch S is linear in time, so that
