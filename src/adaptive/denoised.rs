@@ -31,6 +31,25 @@ pub struct DenoisedPicture {
     pub error: DenoisedError,
 }
 
+/// By which the error of a denoised picture is judged.
+#[derive(Clone, Copy)]
+pub(super) struct DenoisedThresholds<'a> {
+    /// What is left of the noise.
+    pub(super) of_noise: &'a ThresholdMap,
+    /// What the denoiser makes of the picture, frame after frame: as the noise where `None`.
+    pub(super) of_still: Option<&'a ThresholdMap>,
+}
+
+impl DenoisedThresholds<'_> {
+    fn error(self, differences: &DenoisedDifferences<'_>) -> DenoisedError {
+        let error = self.of_noise.denoised_error(differences);
+        match self.of_still {
+            None => error,
+            Some(of_still) => error.with_bias_of(&of_still.denoised_error(differences)),
+        }
+    }
+}
+
 /// The film's picture and halves, denoised, and how long it took.
 pub(super) struct TimedDenoising {
     pub(super) film: DenoisedFilm,
@@ -46,13 +65,13 @@ impl TimedDenoising {
         Ok(Self { film: denoised, luminance, seconds: started.elapsed().as_secs_f64() })
     }
 
-    /// Looks at it. `thresholds` are the picture's own, `estimate` is the raw mean.
+    /// Looks at it. `estimate` is the raw mean.
     pub(super) fn judged(
         self,
         film: &Film,
         settings: &LoopSettings,
         tone: &dyn FittedTone,
-        thresholds: &ThresholdMap,
+        thresholds: DenoisedThresholds<'_>,
         estimate: &Estimate,
     ) -> Result<DenoisedPicture, JudgeError> {
         let width = film.width() as usize;
@@ -77,14 +96,14 @@ impl TimedDenoising {
                 error,
             });
         }
-        let error = thresholds.denoised_error(&DenoisedDifferences {
+        let error = thresholds.error(&DenoisedDifferences {
             half_difference: &displayed,
             residual: &shown(&residual),
             residual_half_difference: &shown(&residual_half_difference),
         });
         let chromatic = self.chromatic_errors(film, settings, tone, estimate)?;
         let DenoisedFilm { rgb_cd_m2, lamps_from_cd_m2, .. } = self.film;
-        let mut rgb_cd_m2 = blended_rgb(thresholds, &error, rgb_cd_m2, &estimate.rgb_cd_m2, &slope);
+        let mut rgb_cd_m2 = blended_rgb(thresholds.of_noise, &error, rgb_cd_m2, &estimate.rgb_cd_m2, &slope);
         leave_the_void_dark(film, &mut rgb_cd_m2);
         let luminance_cd_m2 = luminance_plane(&rgb_cd_m2, width);
         let error = chromatic.iter().fold(error, DenoisedError::with_channel);
@@ -98,7 +117,7 @@ impl TimedDenoising {
                     let whole = whole.max(luminance_cd_m2.get(pixel.x, pixel.y));
                     seen::display_luminance_at(tone, display, pixel, whole)
                 });
-                error.with_missed_light(&thresholds.measured_visibility(&dark.mean))
+                error.with_missed_light(&thresholds.of_noise.measured_visibility(&dark.mean))
             }
             None => error,
         };

@@ -9,8 +9,8 @@ pub use self::noise_on_display::{display_scale, variance_share, variance_shares}
 use self::over_white::OverWhite;
 use self::per_sample::{PerSample, Sources};
 pub use self::steps::Thresholds;
-use self::steps::{Guide, Scatter, found_thresholds};
-use super::denoised::{DenoisedPicture, TimedDenoising};
+use self::steps::{Guide, Scatter, found_thresholds, thresholds_of_still};
+use super::denoised::{DenoisedPicture, DenoisedThresholds, TimedDenoising};
 use super::settings::LoopSettings;
 use crate::denoise::{Denoiser, OidnError};
 use crate::film::{Estimate, Film};
@@ -19,6 +19,7 @@ use fechner_perception::Plane;
 use fechner_perception::denoised::DenoisedError;
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::seen;
+use fechner_perception::threshold::ThresholdMap;
 use fechner_perception::tone::FittedTone;
 use fechner_perception::visibility::MeasuredError;
 use std::borrow::Cow;
@@ -135,6 +136,10 @@ fn judge_by(
     let displayed_guide = guide.displayed(tone.as_ref(), settings);
     let noise = scatter.luminance_variance_of_mean();
     let thresholds = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
+    let of_still = match &denoised {
+        None => None,
+        Some(_) => thresholds_of_still(&displayed_guide, tone.as_ref(), &noise, settings)?,
+    };
     let sources = Sources {
         film,
         guide: &guide,
@@ -156,7 +161,7 @@ fn judge_by(
         None
     };
     still_wanted(settings)?;
-    let look = Look { started, film, settings, estimate, tone, scatter, thresholds, per_sample, over_white };
+    let look = Look { started, film, settings, estimate, tone, scatter, thresholds, of_still, per_sample, over_white };
     look.finished(denoised, inflation)
 }
 
@@ -169,6 +174,8 @@ struct Look<'a> {
     tone: Box<dyn FittedTone>,
     scatter: Scatter,
     thresholds: Thresholds,
+    /// Of what a denoiser leaves in every frame.
+    of_still: Option<ThresholdMap>,
     per_sample: PerSample,
     over_white: Option<OverWhite>,
 }
@@ -209,8 +216,8 @@ impl Look<'_> {
 
     /// The denoised picture and its error, of which what is inferred is multiplied by the root of `inflation`.
     fn judged_picture(&self, found: TimedDenoising, inflation: f64) -> Result<DenoisedPicture, JudgeError> {
-        let mut picture =
-            found.judged(self.film, self.settings, self.tone.as_ref(), &self.thresholds.in_bands, &self.estimate)?;
+        let thresholds = DenoisedThresholds { of_noise: &self.thresholds.in_bands, of_still: self.of_still.as_ref() };
+        let mut picture = found.judged(self.film, self.settings, self.tone.as_ref(), thresholds, &self.estimate)?;
         picture.error.raise_inferred(inflation.sqrt());
         if self.film.width().min(self.film.height()) < LEAST_SIDE_OF_HALVES {
             picture.error = picture.error.with_noise_of_at_least(&self.raw_noise());

@@ -19,7 +19,7 @@ pub struct ChromaticPicture<'a> {
 }
 
 /// What can be seen of the picture's error in this channel, in which nothing moves it towards its raw mean. `frames`: of a moving picture, whose
-/// noise is new in every frame; `None` for stills.
+/// noise is new in every frame, and whose bias stays; `None` for stills.
 ///
 /// # Errors
 /// As [`CastleChromatic::new`] and [`chromatic_threshold_map`], and for an impossible timing.
@@ -36,7 +36,7 @@ pub fn chromatic_error(
         None => error,
         Some(timing) => {
             let factor = timing.chromatic_energy(channel)?.sqrt() as f32;
-            error.scaled(|plane| plane.map(|value| factor * value))
+            error.clone().scaled(|plane| plane.map(|value| factor * value)).with_bias_of(&error)
         }
     })
 }

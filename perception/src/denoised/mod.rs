@@ -104,6 +104,18 @@ impl DenoisedError {
         self
     }
 
+    /// This error's noise with the bias that `other` thresholds say there is: of frames, whose noise is new in each and whose bias stays.
+    ///
+    /// # Panics
+    /// Where the two are of pictures of two sizes.
+    #[must_use]
+    pub fn with_bias_of(mut self, other: &Self) -> Self {
+        self.bias.clone_from(&other.bias);
+        self.bias_squared_standard_error.clone_from(&other.bias_squared_standard_error);
+        self.visibility = self.variance.combined(&self.bias, f32::hypot);
+        self
+    }
+
     /// This error with light beside it that no sample has found, of which so much is seen: it is missing in the raw mean too, so no blend
     /// brings it back.
     ///

@@ -7,6 +7,9 @@
 //!
 //! A tile is looked at through a window that fades to nothing at its borders, for the eye's filters would see an edge there
 //! (Welch 1967).
+//!
+//! In shots found energies are by thresholds of noise that is new in every frame, of which predicted bias is not: there the audit notices bias alone
+//! where it is about twice what was inferred.
 
 use super::{Audit, Energy, FreshSamples, LEAST_TILES, STRATUM, Tile, choose_tiles, is_large_enough};
 use crate::adaptive::judge::{JudgeError, Judgement};

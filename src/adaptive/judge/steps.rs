@@ -11,7 +11,7 @@ use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::colour::ChromaticGains;
-use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FreshNoise};
+use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FrameTiming, FreshNoise};
 use fechner_perception::model::{ModelInputs, ThresholdModel};
 use fechner_perception::seen::{self, SceneColours};
 use fechner_perception::threshold::{GuideNoise, ThresholdInputs, ThresholdMap, threshold_map};
@@ -257,8 +257,7 @@ pub(super) fn found_thresholds(
     noise: &Plane,
     settings: &LoopSettings,
 ) -> Result<Thresholds, JudgeError> {
-    // Noise goes through the loss of acuity that the operator shows, as the picture does.
-    let csf = BehindAcuity { csf: contrast_sensitivity(settings)?, acuity: tone.acuity() };
+    let csf = contrast_sensitivity(settings.frames, tone, settings)?;
     let guide_noise = GuideNoise::BeforeDenoising(noise);
     let inputs = ThresholdInputs { display_luminance_cd_m2: displayed_guide, guide_noise };
     let at_rest = threshold_map(&inputs, &settings.viewing, &csf)?;
@@ -276,6 +275,24 @@ pub(super) fn found_thresholds(
     };
     let per_pixel = settings.model.as_deref().map(of_model).transpose()?;
     Ok(Thresholds { in_bands, per_pixel })
+}
+
+/// The thresholds of what stands still, where [`found_thresholds`] are of noise that is new in every frame: `None` of a still. Arguments as
+/// there.
+pub(super) fn thresholds_of_still(
+    displayed_guide: &Plane,
+    tone: &dyn FittedTone,
+    noise: &Plane,
+    settings: &LoopSettings,
+) -> Result<Option<ThresholdMap>, JudgeError> {
+    if settings.frames.is_none() {
+        return Ok(None);
+    }
+    let csf = contrast_sensitivity(None, tone, settings)?;
+    let guide_noise = GuideNoise::BeforeDenoising(noise);
+    let inputs = ThresholdInputs { display_luminance_cd_m2: displayed_guide, guide_noise };
+    let thresholds = threshold_map(&inputs, &settings.viewing, &csf)?;
+    Ok(Some(if settings.gazes.is_empty() { thresholds } else { thresholds.with_gazes(&settings.gazes) }))
 }
 
 /// Thresholds away from where one looks, and on what the eye does not follow.
@@ -304,11 +321,17 @@ pub(super) fn chromatic_gains(
     })
 }
 
-/// Of the eye for noise that stands still, or that is new in every frame.
-fn contrast_sensitivity(settings: &LoopSettings) -> Result<Box<dyn ContrastSensitivity>, JudgeError> {
+/// Of the eye for noise that stands still, or that is new in every frame of such a timing. Noise goes through the loss of acuity that the
+/// operator shows, as the picture does.
+fn contrast_sensitivity(
+    frames: Option<FrameTiming>,
+    tone: &dyn FittedTone,
+    settings: &LoopSettings,
+) -> Result<BehindAcuity<Box<dyn ContrastSensitivity>>, JudgeError> {
     let area_deg2 = settings.viewing.observer.csf_area_deg2;
-    Ok(match settings.frames {
+    let csf: Box<dyn ContrastSensitivity> = match frames {
         None => Box::new(CastleCsf::new(area_deg2)?),
         Some(timing) => Box::new(FreshNoise::new(area_deg2, timing)?),
-    })
+    };
+    Ok(BehindAcuity { csf, acuity: tone.acuity() })
 }

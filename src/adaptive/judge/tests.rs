@@ -5,6 +5,7 @@ use crate::denoise::Denoiser;
 use crate::film::film_of_samples;
 use crate::integrator::{FirstHit, PathSample};
 use crate::sampler::hash_words;
+use fechner_perception::csf::FrameTiming;
 use fechner_perception::tone::{Pixel, SceneLight, operator};
 use glam::Vec3;
 
@@ -232,4 +233,21 @@ fn noise_of_alpha_is_seen_over_white() {
         assert!(per_sample > 0.0 && rough.sqrt() > 0.5 * judgement.predicted.get(32, 32), "{rough}");
         assert!(judgement.variance_per_sample.is_some_and(|[a, b]| a.get(32, 32) > 0.0 && b.get(32, 32) > 0.0));
     }
+}
+
+/// What a denoiser smears stays where it is from frame to frame: of a shot noise is seen less than of a still, and its bias as well.
+#[test]
+fn a_denoised_frame_has_the_bias_of_a_still() {
+    let film = film_of(|pixel, random| Vec3::splat(0.5 + 0.3 * (pixel % 2) as f32 + 0.4 * random));
+    let timing = FrameTiming { frames_per_second: 24.0, persistence: 1.0 };
+    let error_of = |frames| {
+        let settings = LoopSettings { denoiser: Some(Denoiser::Builtin), frames, ..settings() };
+        let judgement = judge(&film, &settings, 1.0).expect("judges");
+        judgement.denoised_error().expect("denoised").into_owned()
+    };
+    let (still, frame) = (error_of(None), error_of(Some(timing)));
+    let [still_bias, frame_bias] = [&still, &frame].map(|error| error.bias.mean());
+    assert!(still_bias > 0.1 && (frame_bias / still_bias - 1.0).abs() < 1e-3, "{frame_bias}, {still_bias} of a still");
+    let [still_noise, frame_noise] = [&still, &frame].map(|error| error.variance.mean());
+    assert!(frame_noise < 0.95 * still_noise, "noise of {frame_noise}, {still_noise} of a still");
 }
