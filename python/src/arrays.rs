@@ -105,9 +105,20 @@ fn converted<'py>(what: &'static str, given: &Bound<'py, PyAny>) -> PyResult<Bou
     kind.set_item("dtype", "float32")?;
     // Its own memory unless it is aligned as well, which `ascontiguousarray` does not see to.
     kind.set_item("requirements", "CA")?;
-    let array =
-        py.import("numpy")?.call_method("require", (given,), Some(&kind)).map_err(|error| no_array(what, py, error))?;
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("asarray", (given,)).map_err(|error| no_array(what, py, error))?;
+    check_real(what, &array)?;
+    let array = numpy.call_method("require", (array,), Some(&kind)).map_err(|error| no_array(what, py, error))?;
     Ok(array.cast_into::<PyArrayDyn<f32>>()?)
+}
+
+/// Refuses what numpy would make numbers of, dropping a part: complex numbers, words and dates.
+fn check_real(what: &'static str, array: &Bound<'_, PyAny>) -> PyResult<()> {
+    let dtype = array.getattr("dtype")?;
+    if "cSUmM".contains(&dtype.getattr("kind")?.extract::<String>()?) {
+        return Err(PyValueError::new_err(format!("{what} is an array of {dtype}; it must be of real numbers")));
+    }
+    Ok(())
 }
 
 /// What numpy could not convert is a `ValueError`; an interrupt or a lack of memory on the way stays what it is.

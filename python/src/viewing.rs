@@ -61,9 +61,12 @@ impl Display {
         display::Display::preset_names().to_vec()
     }
 
-    /// Luminance, cd/m², that the display shows for linear light 0..1 (clamped).
-    fn luminance_cd_m2(&self, relative: f64) -> f64 {
-        self.0.luminance_cd_m2(relative)
+    /// Luminance, cd/m², that the display shows for linear light 0..1 (clamped). ValueError for NaN.
+    fn luminance_cd_m2(&self, relative: f64) -> PyResult<f64> {
+        if relative.is_nan() {
+            return Err(PyValueError::new_err("relative is NaN; it must be a number"));
+        }
+        Ok(self.0.luminance_cd_m2(relative))
     }
 
     /// The preset's name.
