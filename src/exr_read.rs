@@ -24,7 +24,7 @@ mod window;
 
 use attributes::{add_missing, attributes, part_of, primaries};
 use checks::{check_memory, guarded, read_headers};
-pub(crate) use colour::{Replaced, make_finite};
+pub(crate) use colour::make_finite;
 pub use colour::{ScenePicture, negative_light};
 use wanted::Wanted;
 pub use window::Window;

@@ -17,6 +17,17 @@ pub(super) enum Colour<'a> {
     Grey(&'a [f32]),
 }
 
+impl<'a> Colour<'a> {
+    /// Three, or one.
+    pub(super) fn channels(&self) -> impl Iterator<Item = &'a [f32]> {
+        match self {
+            Self::Rgb(channels) => channels.iter(),
+            Self::Grey(luminance) => std::slice::from_ref(luminance).iter(),
+        }
+        .copied()
+    }
+}
+
 /// Reads the motion of a file that shows as many pixels as the picture it is for.
 pub(super) fn read_motion(path: &Path, (width, height): (usize, usize)) -> Result<ExrImage> {
     let exr = read_exr_channels(path, |all| all.iter().filter(|name| is_of_motion(name)).cloned().collect())?;

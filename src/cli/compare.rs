@@ -163,8 +163,10 @@ struct Compared<'a> {
 impl<'a> Compared<'a> {
     fn read(arguments: &'a CompareArguments) -> Result<Self> {
         let nits_per_unit = arguments.seeing.nits_per_unit;
-        let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
-        let test = InputPicture::read(&arguments.test, nits_per_unit)?;
+        let mut reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
+        let mut test = InputPicture::read(&arguments.test, nits_per_unit)?;
+        reference.beside(&test);
+        test.beside(&reference);
         check_alike((&arguments.reference, reference.shape()), (&arguments.test, test.shape()))?;
         let pictures = [(arguments.reference.as_path(), &reference), (arguments.test.as_path(), &test)];
         for (path, picture) in pictures {

@@ -27,7 +27,9 @@ pub(super) struct InputPicture {
     kept_tone: Option<KeptTone>,
     /// How much of each pixel it covers, 0 to 1, where an EXR file leaves some of any uncovered. Its values are multiplied by it.
     alpha: Option<Vec<f32>>,
-    /// The same of a file of codes, whose light is not multiplied by it.
+    /// Whether an EXR file has light and an alpha of 0 all over, as passes have it, which is not looked at.
+    is_pass: bool,
+    /// [`Self::alpha`] of a file of codes, whose light is not multiplied by it.
     straight_alpha: Option<Vec<f32>>,
     /// Where it lies, if it is a part of a larger picture.
     part_of: Option<PartOf>,
@@ -126,6 +128,13 @@ impl InputPicture {
         self.coverage().is_some()
     }
 
+    /// Beside a pass what covers nothing is a pass, too, in which no light is.
+    pub(super) fn beside(&mut self, other: &Self) {
+        if other.is_pass && self.coverage().is_some_and(|coverage| coverage.iter().all(|&covered| covered == 0.0)) {
+            self.alpha = None;
+        }
+    }
+
     /// Says where a picture lies that does not cover all.
     pub(super) fn note_if_transparent(&self, source: Source<'_>, lies: &str) {
         if self.is_transparent() {
@@ -153,9 +162,13 @@ impl InputPicture {
         matches!(self.content, Content::Scene { .. })
     }
 
-    /// Whether its values mean what those of another picture of as many pixels mean.
+    /// Whether it holds light as another picture of as many pixels does, if perhaps by another unit, or the same codes.
     pub(super) fn has_values_like(&self, other: &Self) -> bool {
-        self.content == other.content && self.rgb.len() == other.rgb.len()
+        let are_alike = match (self.content, other.content) {
+            (Content::Display(own), Content::Display(other)) => own == other,
+            (own, other) => std::mem::discriminant(&own) == std::mem::discriminant(&other),
+        };
+        are_alike && self.rgb.len() == other.rgb.len()
     }
 
     /// Whether it holds what is sent to a display, from 0 to 1.

@@ -6,6 +6,7 @@ use super::{ExrImage, Window};
 use crate::output::Attribute;
 use fechner_perception::photometry::{REC709_WEIGHTS, luminance};
 use fechner_perception::primaries::{Primaries, apply};
+use std::fmt;
 
 /// The picture that a file is meant to show.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,9 +48,7 @@ impl ExrImage {
         } else {
             own("Y")?.iter().map(|&y| [y; 3]).collect()
         };
-        if let Some(replaced) = make_finite(&mut [rgb.as_flattened_mut()]) {
-            notes.push(format!("{} values that are not finite were replaced", replaced.count));
-        }
+        notes.extend(make_finite(&mut [rgb.as_flattened_mut()]).map(|replaced| replaced.to_string()));
         if let Some(matrix) = primaries.to_other(&Primaries::REC709) {
             rgb.iter_mut().for_each(|pixel| *pixel = apply(&matrix, pixel.map(f64::from)).map(|c| c as f32));
             if self.chromaticities == Some(primaries) {
@@ -122,9 +121,16 @@ const LARGEST_HALF: f32 = 65504.0;
 
 /// Values that were not finite.
 pub(crate) struct Replaced {
-    pub(crate) count: usize,
+    count: usize,
     /// What stands for infinity: the largest value of the picture or of a half. NaN and −∞ are no light at all, and became 0.
-    pub(crate) infinity: f32,
+    infinity: f32,
+}
+
+impl fmt::Display for Replaced {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { count, infinity } = self;
+        write!(f, "{count} values that are not finite were replaced: infinity by {infinity}, others by 0")
+    }
 }
 
 /// Replaces what would poison all that it meets; `None` where there is nothing to replace.

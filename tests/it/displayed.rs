@@ -120,6 +120,15 @@ fn noise_in_a_mean_of_the_halves_does_not_hide_itself() {
         assert!(said.contains("it is the mean of the halves"), "{said}");
         assert!((its_seen / seen - 1.0).abs() < 0.1, "{relative}: {its_seen}, not {seen}");
         assert!((its_allowed / allowed - 1.0).abs() < 0.1, "{relative}: {its_allowed}, not {allowed}");
+        // What has been marked in a place, or kept by a format with loss, is the mean still.
+        let mean_of = |pixel| 0.5 * (a(pixel) + b(pixel));
+        write(folder.path(), "marked.exr", |pixel| [if pixel == 77 { 300.0 } else { mean_of(pixel) }; 3]);
+        write(folder.path(), "coded.exr", |pixel| [mean_of(pixel) * (1.0 + 0.1 * relative * white(pixel, 3)); 3]);
+        for guide in ["marked.exr", "coded.exr"] {
+            let (_, seen_so, said) = ask(guide);
+            assert!(said.contains("it is the mean of the halves"), "{guide}: {said}");
+            assert!((seen_so / seen - 1.0).abs() < 0.12, "{guide}, {relative}: {seen_so}, not {seen}");
+        }
         for guide in ["more.exr", "a.exr", "b.exr"] {
             let (_, _, said) = ask(guide);
             assert!(said.contains("it is one of the halves, or has more of one"), "{guide}: {said}");
@@ -188,6 +197,33 @@ fn coverage_alone_is_seen_over_white() {
     }
     let (code, said) = fechner(folder.path(), &["compare", "disc.exr", "disc.png", "--operator", "absolute"]);
     assert_eq!(code, 0, "{said}");
+}
+
+/// A frame before its figure comes covers nothing. It passed for opaque black, and `tonemap` wrote it so between frames that are not; a pass has
+/// light and no alpha, and beside it black is what it has none in.
+#[test]
+fn what_covers_nothing_is_transparent_and_passes_are_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kinds = [("nothing", 0.0, 0.0), ("black", 0.0, 1.0), ("pass", 40.0, 0.0), ("broken", f32::NAN, 1.0)];
+    for (name, light, alpha) in kinds {
+        let mut picture = Picture::new(SIDE as u32, SIDE as u32);
+        ["R", "G", "B"].into_iter().for_each(|letter| picture.push_f32(letter, vec![light; SIDE * SIDE]));
+        picture.push_f32("A", vec![alpha; SIDE * SIDE]);
+        picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+        write_exr(&folder.path().join(format!("{name}.exr")), &picture).expect("written");
+    }
+    run(folder.path(), &["tonemap", "nothing.exr", "-o", "nothing.png", "--operator", "absolute"]);
+    let shown = image::open(folder.path().join("nothing.png")).expect("a picture").into_rgba8();
+    assert!(shown.pixels().all(|pixel| pixel.0[3] == 0));
+    let compare = |test: &str| fechner(folder.path(), &["compare", "nothing.exr", test, "--operator", "absolute"]);
+    let (code, said) = compare("nothing.png");
+    assert!(code == 0 && visibility(&said) == 0.0, "{said}");
+    let (code, said) = compare("black.exr");
+    assert!(code == 1 && said.contains("over white"), "{said}");
+    let (code, said) = compare("pass.exr");
+    assert!(code == 1 && said.contains("not looked at") && !said.contains("over white"), "{said}");
+    let (code, said) = compare("broken.exr");
+    assert!(code == 2 && said.contains("none of its values is finite"), "{said}");
 }
 
 /// Detail in the dark is there whatever the room adds, in PQ as in sRGB.

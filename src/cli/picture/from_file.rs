@@ -85,6 +85,9 @@ impl InputPicture {
             // Light that is none of a number is replaced; a map has nothing that would be right in its place.
             bail!(importance::refusal(source.path, value, at));
         }
+        if channels::colour(exr).is_some_and(|colour| !colour.channels().flatten().any(|value| value.is_finite())) {
+            bail!("{}: none of its values is finite, so that there is nothing to look at", source.path.display());
+        }
         let Some(picture) = exr.scene_picture(picture_channel) else {
             bail!(
                 "{}: there are no channels R, G and B of one layer, nor Y of the root or of a layer that is called as pictures are; \
@@ -104,6 +107,11 @@ impl InputPicture {
             _ => Content::Scene { nits_per_unit },
         };
         let (width, height) = (picture.width as usize, picture.height as usize);
+        let alpha = alpha(exr);
+        let is_pass = has_uncovered_light(&picture.rgb, alpha.as_deref());
+        if is_pass {
+            source.note("its alpha is 0 all over, and is not looked at");
+        }
         Ok(Self {
             width,
             height,
@@ -112,7 +120,8 @@ impl InputPicture {
             pixel_aspect_ratio: exr.pixel_aspect_ratio,
             made_for: kept_tone::display_in(exr),
             kept_tone,
-            alpha: alpha(source, exr),
+            alpha: alpha.filter(|_| !is_pass),
+            is_pass,
             straight_alpha: None,
             part_of: exr.part_of,
         })
@@ -171,6 +180,7 @@ impl InputPicture {
             made_for: None,
             kept_tone: None,
             alpha: None,
+            is_pass: false,
             straight_alpha: None,
             part_of: None,
         }
@@ -232,24 +242,21 @@ fn words_of(format: ImageFormat) -> String {
 }
 
 /// How much of each pixel an EXR picture covers; `None` where that is all of all of them.
-fn alpha(source: Source<'_>, exr: &ExrImage) -> Option<Vec<f32>> {
+fn alpha(exr: &ExrImage) -> Option<Vec<f32>> {
     let covered = |&alpha: &f32| if alpha.is_nan() { 0.0 } else { alpha.clamp(0.0, 1.0) };
     let alpha = exr.in_display_window(channels::alpha(exr)?.iter().map(covered).collect());
-    if alpha.iter().all(|&a| a == 0.0) {
-        source.note("its alpha is 0 all over, and is not looked at");
-        return None;
-    }
     alpha.iter().any(|&a| a < 1.0).then_some(alpha)
+}
+
+/// Whether alpha is 0 all over a picture that has light: of one that covers nothing neither has any.
+fn has_uncovered_light(rgb: &[[f32; 3]], alpha: Option<&[f32]>) -> bool {
+    alpha.is_some_and(|alpha| alpha.iter().all(|&a| a == 0.0)) && rgb.as_flattened().iter().any(|&value| value != 0.0)
 }
 
 /// The first value of a picture that is not finite, and the pixel of what is shown that has it.
 fn first_not_finite(exr: &ExrImage) -> Option<(f32, (usize, usize))> {
-    let channels = match channels::colour(exr)? {
-        Colour::Rgb(channels) => channels.to_vec(),
-        Colour::Grey(luminance) => vec![luminance],
-    };
     let width = exr.display_window.width as usize;
-    channels.into_iter().find_map(|channel| {
+    channels::colour(exr)?.channels().find_map(|channel| {
         let shown = exr.in_display_window(channel.to_vec());
         let index = shown.iter().position(|value| !value.is_finite())?;
         Some((shown[index], (index % width, index / width)))

@@ -3,7 +3,7 @@
 
 use super::Picture;
 use crate::exr_read::layers::colour_layer;
-use crate::exr_read::{self, ExrImage, Replaced, Window, layer_and_part, negative_light};
+use crate::exr_read::{self, ExrImage, Window, layer_and_part, negative_light};
 use crate::hdr_read::{self, HdrHeader, with_known_header};
 use crate::jpeg_read;
 use crate::read_file;
@@ -313,7 +313,5 @@ fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Res
 
 /// As [`exr_read::make_finite`], with a note.
 fn make_finite(channels: &mut [&mut [f32]], notes: &mut Vec<String>) {
-    if let Some(Replaced { count, infinity }) = exr_read::make_finite(channels) {
-        notes.push(format!("{count} values that are not finite were replaced: infinity by {infinity}, others by 0"));
-    }
+    notes.extend(exr_read::make_finite(channels).map(|replaced| replaced.to_string()));
 }
