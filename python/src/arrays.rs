@@ -115,7 +115,7 @@ fn converted<'py>(what: &'static str, given: &Bound<'py, PyAny>) -> PyResult<Bou
 /// Refuses what numpy would make numbers of, dropping a part: complex numbers, words and dates.
 fn check_real(what: &'static str, array: &Bound<'_, PyAny>) -> PyResult<()> {
     let dtype = array.getattr("dtype")?;
-    if "cSUmM".contains(&dtype.getattr("kind")?.extract::<String>()?) {
+    if "cSTUmM".contains(&dtype.getattr("kind")?.extract::<String>()?) {
         return Err(PyValueError::new_err(format!("{what} is an array of {dtype}; it must be of real numbers")));
     }
     Ok(())

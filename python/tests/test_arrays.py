@@ -104,6 +104,7 @@ def colour(shape):
         (lambda: fechner.difference(GREY * np.nan, GREY), "NaN"),
         (lambda: fechner.threshold_map(GREY * (1 + 1j)), "complex64; it must be of real numbers"),
         (lambda: fechner.threshold_map(GREY.astype(str)), "it must be of real numbers"),
+        (lambda: fechner.threshold_map(GREY.astype("datetime64[s]")), "it must be of real numbers"),
         (lambda: fechner.Display().luminance_cd_m2(float("nan")), "relative is NaN"),
         (lambda: fechner.tone_map(colour((4, 4, 3)) * np.nan, "ward94"), "NaN; light must be finite"),
         (lambda: fechner.tone_map(colour((4, 4, 3)), "darkroom"), "no tone operator is called `darkroom`; there are:"),

@@ -29,6 +29,8 @@ pub struct DenoisedPicture {
     pub half_difference: Plane,
     /// What can be seen of its error, without importance.
     pub error: DenoisedError,
+    /// The same of luminance if all of it were new in every frame, in a shot.
+    pub error_as_noise: Option<DenoisedError>,
 }
 
 /// By which the error of a denoised picture is judged.
@@ -41,11 +43,16 @@ pub(super) struct DenoisedThresholds<'a> {
 }
 
 impl DenoisedThresholds<'_> {
-    fn error(self, differences: &DenoisedDifferences<'_>) -> DenoisedError {
-        let error = self.of_noise.denoised_error(differences);
+    /// [`DenoisedPicture::error`] and [`DenoisedPicture::error_as_noise`].
+    fn errors(self, differences: &DenoisedDifferences<'_>) -> (DenoisedError, Option<DenoisedError>) {
+        let as_noise = self.of_noise.denoised_error(differences);
         match self.of_still {
-            None => error,
-            Some(of_still) => error.with_bias_of(&of_still.denoised_error(differences)),
+            None => (as_noise, None),
+            Some(of_still) => {
+                let error = as_noise.clone().with_bias_of(&of_still.denoised_error(differences));
+                // Of those nobody asks.
+                (error, Some(DenoisedError { raw_shares: Vec::new(), ..as_noise }))
+            }
         }
     }
 }
@@ -94,9 +101,10 @@ impl TimedDenoising {
                 luminance_cd_m2: self.luminance,
                 half_difference: displayed,
                 error,
+                error_as_noise: None,
             });
         }
-        let error = thresholds.error(&DenoisedDifferences {
+        let (error, error_as_noise) = thresholds.errors(&DenoisedDifferences {
             half_difference: &displayed,
             residual: &shown(&residual),
             residual_half_difference: &shown(&residual_half_difference),
@@ -121,7 +129,7 @@ impl TimedDenoising {
             }
             None => error,
         };
-        Ok(DenoisedPicture { rgb_cd_m2, luminance_cd_m2, half_difference: displayed, error })
+        Ok(DenoisedPicture { rgb_cd_m2, luminance_cd_m2, half_difference: displayed, error, error_as_noise })
     }
 
     /// What can be seen of the error in both chromatic channels; nothing by a model of luminance alone.

@@ -140,6 +140,7 @@ fn judge_by(
         None => None,
         Some(_) => thresholds_of_still(&displayed_guide, tone.as_ref(), &noise, settings)?,
     };
+    still_wanted(settings)?;
     let sources = Sources {
         film,
         guide: &guide,
@@ -218,7 +219,9 @@ impl Look<'_> {
     fn judged_picture(&self, found: TimedDenoising, inflation: f64) -> Result<DenoisedPicture, JudgeError> {
         let thresholds = DenoisedThresholds { of_noise: &self.thresholds.in_bands, of_still: self.of_still.as_ref() };
         let mut picture = found.judged(self.film, self.settings, self.tone.as_ref(), thresholds, &self.estimate)?;
-        picture.error.raise_inferred(inflation.sqrt());
+        for error in [Some(&mut picture.error), picture.error_as_noise.as_mut()].into_iter().flatten() {
+            error.raise_inferred(inflation.sqrt());
+        }
         if self.film.width().min(self.film.height()) < LEAST_SIDE_OF_HALVES {
             picture.error = picture.error.with_noise_of_at_least(&self.raw_noise());
         }

@@ -165,8 +165,8 @@ impl<'a> Compared<'a> {
         let nits_per_unit = arguments.seeing.nits_per_unit;
         let mut reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
         let mut test = InputPicture::read(&arguments.test, nits_per_unit)?;
-        reference.beside(&test);
-        test.beside(&reference);
+        reference.be_a_pass_beside(&test);
+        test.be_a_pass_beside(&reference);
         check_alike((&arguments.reference, reference.shape()), (&arguments.test, test.shape()))?;
         let pictures = [(arguments.reference.as_path(), &reference), (arguments.test.as_path(), &test)];
         for (path, picture) in pictures {

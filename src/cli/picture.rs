@@ -129,9 +129,9 @@ impl InputPicture {
     }
 
     /// Beside a pass what covers nothing is a pass, too, in which no light is.
-    pub(super) fn beside(&mut self, other: &Self) {
+    pub(super) fn be_a_pass_beside(&mut self, other: &Self) {
         if other.is_pass && self.coverage().is_some_and(|coverage| coverage.iter().all(|&covered| covered == 0.0)) {
-            self.alpha = None;
+            (self.alpha, self.straight_alpha) = (None, None);
         }
     }
 
@@ -169,6 +169,14 @@ impl InputPicture {
             (own, other) => std::mem::discriminant(&own) == std::mem::discriminant(&other),
         };
         are_alike && self.rgb.len() == other.rgb.len()
+    }
+
+    /// Luminance of RGB (1, 1, 1), cd/m²; 1 of codes.
+    pub(super) fn light_of_one_cd_m2(&self) -> f64 {
+        match self.content {
+            Content::Scene { nits_per_unit } | Content::Emitted { nits_per_unit } => nits_per_unit,
+            Content::Display(_) => 1.0,
+        }
     }
 
     /// Whether it holds what is sent to a display, from 0 to 1.

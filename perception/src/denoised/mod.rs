@@ -105,6 +105,7 @@ impl DenoisedError {
     }
 
     /// This error's noise with the bias that `other` thresholds say there is: of frames, whose noise is new in each and whose bias stays.
+    /// Factors and shares stay this one's: within a band shares hardly depend on how well it is seen.
     ///
     /// # Panics
     /// Where the two are of pictures of two sizes.

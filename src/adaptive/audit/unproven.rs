@@ -8,8 +8,7 @@
 //! A tile is looked at through a window that fades to nothing at its borders, for the eye's filters would see an edge there
 //! (Welch 1967).
 //!
-//! In shots found energies are by thresholds of noise that is new in every frame, of which predicted bias is not: there the audit notices bias alone
-//! where it is about twice what was inferred.
+//! In a shot both are by thresholds of noise that is new in every frame.
 
 use super::{Audit, Energy, FreshSamples, LEAST_TILES, STRATUM, Tile, choose_tiles, is_large_enough};
 use crate::adaptive::judge::{JudgeError, Judgement};
@@ -55,6 +54,7 @@ pub fn audit_unproven(
     let fresh = FreshSamples::take(tracer, film, &pixels, TIMES, settings, round)?;
 
     let slope = seen::display_slope(judgement.tone.as_ref(), &settings.viewing.display, &denoised.luminance_cd_m2);
+    let expected = denoised.error_as_noise.as_ref().unwrap_or(&denoised.error);
     let nothing = || Plane::filled(width, film.height() as usize, 0.0);
     let (mut difference, mut noise, mut predicted) = (nothing(), nothing(), nothing());
     for (at, (&pixel, halves)) in pixels.iter().zip(&fresh.halves).enumerate() {
@@ -63,7 +63,7 @@ pub fn audit_unproven(
         let mean = Mean::of(halves, settings.nits_per_unit);
         difference.values_mut()[pixel] = shown * (denoised.luminance_cd_m2.values()[pixel] - mean.luminance_cd_m2);
         noise.values_mut()[pixel] = shown * mean.noise_cd_m2;
-        predicted.values_mut()[pixel] = window * denoised.error.visibility.values()[pixel];
+        predicted.values_mut()[pixel] = window * expected.visibility.values()[pixel];
     }
     // Not pooled over the eye's window, which would carry a third of it out of the tile's reach.
     let [difference, noise] =

@@ -2,10 +2,13 @@
 
 use crate::cli::picture::InputPicture;
 
+/// What half floats hold above 0, in a file's unit.
+const SMALLEST_HALF: f64 = 6e-8;
+
 /// What a guide has of the halves.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum MadeOf {
-    /// It is the mean of their values in every pixel.
+    /// It is their mean, in most of its values.
     TheirMean,
     /// One of them, or a mean with other weights: its noise depends on how noisy each of them is, which two pictures do not tell. A reference
     /// beside a render was taken to be as noisy as that, and noise to be 1.6 times as visible as it is.
@@ -22,13 +25,13 @@ impl MadeOf {
             return Self::Else;
         }
         // What files hold between black and white has 8 bits, perhaps.
-        let step = if guide.holds_codes() { 1.0 / 255.0 } else { 1e-6 };
+        let step = if guide.holds_codes() { 2.0 / 255.0 } else { SMALLEST_HALF * guide.light_of_one_cd_m2() };
         let [guide, a, b] =
             [guide, a, b].map(|picture| picture.light_cd_m2().unwrap_or_else(|| picture.codes().to_vec()));
         let values = [&guide, &a, &b].map(|picture| picture.as_flattened().iter().map(|&value| f64::from(value)));
         let [guide, a, b] = values;
         let shares = Shares::of(guide.zip(a.zip(b)), step);
-        match shares.most_common() {
+        match shares.common() {
             Some(0.48..=0.52) => Self::TheirMean,
             Some(-0.02..=1.02) => Self::OneMoreThanTheOther,
             _ => Self::Else,
@@ -82,7 +85,7 @@ impl Shares {
 
     /// The median, if four values of five are about as near to it as files with loss leave them. Of a clean picture between two halves as noisy as
     /// each other three of ten are: 2/π · atan ½.
-    fn most_common(&self) -> Option<f64> {
+    fn common(&self) -> Option<f64> {
         const NEAR: usize = 25;
         const LEAST_SHARE: f64 = 0.8;
         let before = |bin: usize| self.bins[..bin].iter().sum::<usize>();

@@ -124,7 +124,7 @@ pub(super) struct Scratch {
 /// The most pixels to each side that are compared.
 const MOST_PATCH: usize = 2;
 /// As wide as a tile's neighbourhoods are and more, in whole vectors.
-const WIDEST: usize = TILE + 8;
+pub(super) const WIDEST: usize = TILE + 8;
 
 impl<const PATCH: usize> Likeness<'_, PATCH> {
     const FITS: () = assert!(PATCH <= MOST_PATCH, "a patch is wider than there is room for");

@@ -1,5 +1,6 @@
 //! Pictures of one channel with a border that may be read.
 
+use super::likeness::WIDEST;
 use super::taps::FARTHEST;
 use rayon::prelude::*;
 
@@ -7,6 +8,8 @@ use rayon::prelude::*;
 pub(super) const TILE: usize = 16;
 /// Pixels beyond the picture that may be read: the farthest neighbour's neighbourhood, in whole vectors.
 pub(super) const BORDER: usize = FARTHEST + 8;
+
+const _: () = assert!(FARTHEST + WIDEST - TILE <= BORDER, "rows of neighbourhoods would end in the next row");
 
 /// What is read beyond the picture.
 #[derive(Clone, Copy)]

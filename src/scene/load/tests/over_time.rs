@@ -341,7 +341,7 @@ fn turns_go_as_far_as_they_are_written() {
 #[test]
 fn what_is_flat_for_a_moment_is_not_missing() {
     let card = "name = \"card\"\nbox = { min = [0, 0, 0], max = [1, 1, 1] }\nmaterial = \"white\"\n";
-    for (from, to, seconds) in [("[-1, 1, 1]", "1", 0.5), ("1e-20", "1", 0.0)] {
+    for (from, to, seconds) in [("[-1, 1, 1]", "1", 0.5), ("1e-20", "1", 0.0), ("1e-13", "1", 0.0)] {
         let text = |shutter_s: f64| {
             let camera = TOML.replace("look_at = [0, 0, 0]", &format!("look_at = [0, 0, 0]\nshutter_s = {shutter_s}"));
             let keyframes = format!("keyframes = [ {{ time = 0, scale = {from} }}, {{ time = 1, scale = {to} }} ]");

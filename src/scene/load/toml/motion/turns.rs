@@ -3,6 +3,7 @@
 
 use super::{Between, Keyframes, Turn, moving, scale, turn};
 use crate::scene::load::toml::fields::Value;
+use crate::scene::load::validate::is_invertible;
 use crate::scene::load::{LoadError, Shutter, shapes};
 use crate::scene::{Motion, Pose};
 use glam::{Affine3A, Quat, Vec3};
@@ -82,10 +83,11 @@ impl Keyframes<ObjectKey> {
         let pose = before.interpolate(after, share);
         // A scale that changes its sign, or grows out of next to nothing, is flat for a moment, at which no ray can be brought to the object: it
         // was missing for all the time of a shutter that opens then.
-        if pose.stretch.determinant() != 0.0 {
+        if is_invertible(&pose.to_affine()) {
             return pose;
         }
-        before.interpolate(after, if share < 0.5 { share + BESIDE } else { share - BESIDE })
+        let beside = if share < 0.5 { share + BESIDE } else { share - BESIDE };
+        Pose { stretch: before.interpolate(after, beside).stretch, ..pose }
     }
 
     /// Whether spheres placed by `before` stay spheres at all times. Between two keyframes the stretch S is linear in time, so that
