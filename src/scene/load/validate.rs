@@ -175,7 +175,7 @@ fn repair_attributes(mesh: &mut Mesh) -> bool {
 }
 
 /// Whether the transform is finite and can be undone.
-pub(super) fn is_invertible(transform: &Affine3A) -> bool {
+fn is_invertible(transform: &Affine3A) -> bool {
     if !transform.is_finite() {
         return false;
     }

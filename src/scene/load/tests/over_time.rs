@@ -336,27 +336,6 @@ fn turns_go_as_far_as_they_are_written() {
     assert!(said.contains("half a turn"), "{said}");
 }
 
-/// A card that flips is flat for a moment, and there all the rest of the time. It was missing in all of a frame whose shutter opens then, and so was
-/// what grows out of next to nothing.
-#[test]
-fn what_is_flat_for_a_moment_is_not_missing() {
-    let card = "name = \"card\"\nbox = { min = [0, 0, 0], max = [1, 1, 1] }\nmaterial = \"white\"\n";
-    for (from, to, seconds) in [("[-1, 1, 1]", "1", 0.5), ("1e-20", "1", 0.0), ("1e-13", "1", 0.0)] {
-        let text = |shutter_s: f64| {
-            let camera = TOML.replace("look_at = [0, 0, 0]", &format!("look_at = [0, 0, 0]\nshutter_s = {shutter_s}"));
-            let keyframes = format!("keyframes = [ {{ time = 0, scale = {from} }}, {{ time = 1, scale = {to} }} ]");
-            format!("{camera}{LIT}[[objects]]\n{card}{keyframes}\n")
-        };
-        for shutter_s in [0.0, 0.5] {
-            let scene = File::new("a.toml", &text(shutter_s)).at(seconds);
-            let instance = &scene.instances[0];
-            assert_eq!(scene.meshes[instance.mesh.0 as usize].triangles.len(), 12, "{from} to {to}");
-            let end = instance.motion.as_ref().map(|motion| motion.at(1.0).matrix3.determinant());
-            assert!(end.is_none_or(|size| size > 0.1) && end.is_some() == (shutter_s > 0.0), "{from} to {to}: {end:?}");
-        }
-    }
-}
-
 /// Beyond 65,535 bytes reading them ended in a panic: blanks, as many as a format's width, brought them to their place.
 #[test]
 fn keyframes_may_stand_anywhere_in_a_long_file() {

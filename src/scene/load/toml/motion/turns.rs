@@ -3,7 +3,6 @@
 
 use super::{Between, Keyframes, Turn, moving, scale, turn};
 use crate::scene::load::toml::fields::Value;
-use crate::scene::load::validate::is_invertible;
 use crate::scene::load::{LoadError, Shutter, shapes};
 use crate::scene::{Motion, Pose};
 use glam::{Affine3A, Quat, Vec3};
@@ -77,17 +76,8 @@ pub(in crate::scene::load::toml) fn most_cuts(moving: usize) -> u32 {
 
 impl Keyframes<ObjectKey> {
     fn pose(&self, time: f64) -> Pose {
-        /// Of the way between two keyframes.
-        const BESIDE: f32 = 1e-4;
         let Between { before, after, share } = self.around(time);
-        let pose = before.interpolate(after, share);
-        // A scale that changes its sign, or grows out of next to nothing, is flat for a moment, at which no ray can be brought to the object: it
-        // was missing for all the time of a shutter that opens then.
-        if is_invertible(&pose.to_affine()) {
-            return pose;
-        }
-        let beside = if share < 0.5 { share + BESIDE } else { share - BESIDE };
-        Pose { stretch: before.interpolate(after, beside).stretch, ..pose }
+        before.interpolate(after, share)
     }
 
     /// Whether spheres placed by `before` stay spheres at all times. Between two keyframes the stretch S is linear in time, so that
