@@ -116,7 +116,7 @@ fn converted<'py>(what: &'static str, given: &Bound<'py, PyAny>) -> PyResult<Bou
 fn check_real(what: &'static str, array: &Bound<'_, PyAny>) -> PyResult<()> {
     let dtype = array.getattr("dtype")?;
     if "cSTUmM".contains(&dtype.getattr("kind")?.extract::<String>()?) {
-        return Err(PyValueError::new_err(format!("{what} is an array of {dtype}; it must be of real numbers")));
+        return Err(PyValueError::new_err(format!("{what} is no array of numbers: {dtype} holds none that are real")));
     }
     Ok(())
 }
