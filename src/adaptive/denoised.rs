@@ -45,15 +45,12 @@ pub(super) struct DenoisedThresholds<'a> {
 impl DenoisedThresholds<'_> {
     /// [`DenoisedPicture::error`] and [`DenoisedPicture::error_as_noise`].
     fn errors(self, differences: &DenoisedDifferences<'_>) -> (DenoisedError, Option<DenoisedError>) {
-        let as_noise = self.of_noise.denoised_error(differences);
-        match self.of_still {
-            None => (as_noise, None),
-            Some(of_still) => {
-                let error = as_noise.clone().with_bias_of(&of_still.denoised_error(differences));
-                // Of those nobody asks.
-                (error, Some(DenoisedError { raw_shares: Vec::new(), ..as_noise }))
-            }
-        }
+        let mut as_noise = self.of_noise.denoised_error(differences);
+        let Some(of_still) = self.of_still else { return (as_noise, None) };
+        // A plane a band, of which the audit has no use.
+        let raw_shares = std::mem::take(&mut as_noise.raw_shares);
+        let error = as_noise.clone().with_bias_of(&of_still.denoised_error(differences));
+        (DenoisedError { raw_shares, ..error }, Some(as_noise))
     }
 }
 

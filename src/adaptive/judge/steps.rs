@@ -258,15 +258,12 @@ pub(super) fn found_thresholds(
     settings: &LoopSettings,
 ) -> Result<Thresholds, JudgeError> {
     let csf = contrast_sensitivity(settings.frames, tone, settings)?;
-    let guide_noise = GuideNoise::BeforeDenoising(noise);
-    let inputs = ThresholdInputs { display_luminance_cd_m2: displayed_guide, guide_noise };
-    let at_rest = threshold_map(&inputs, &settings.viewing, &csf)?;
-    let in_bands = under_eye_movements(at_rest, guide, tone, settings)?;
+    let in_bands = in_pursuit(of_resting_eye(&csf, displayed_guide, noise, settings)?, guide, tone, settings)?;
     still_wanted(settings)?;
     let of_model = |model: &dyn ThresholdModel| {
         model.allowed_standard_error_cd_m2(&ModelInputs {
             display_luminance_cd_m2: displayed_guide,
-            guide_noise,
+            guide_noise: GuideNoise::BeforeDenoising(noise),
             image_velocity_deg_s: None,
             attention: None,
             viewing: &settings.viewing,
@@ -289,20 +286,29 @@ pub(super) fn thresholds_of_still(
         return Ok(None);
     }
     let csf = contrast_sensitivity(None, tone, settings)?;
-    let guide_noise = GuideNoise::BeforeDenoising(noise);
-    let inputs = ThresholdInputs { display_luminance_cd_m2: displayed_guide, guide_noise };
-    let thresholds = threshold_map(&inputs, &settings.viewing, &csf)?;
-    Ok(Some(if settings.gazes.is_empty() { thresholds } else { thresholds.with_gazes(&settings.gazes) }))
+    of_resting_eye(&csf, displayed_guide, noise, settings).map(Some)
 }
 
-/// Thresholds away from where one looks, and on what the eye does not follow.
-fn under_eye_movements(
-    at_rest: ThresholdMap,
+/// Thresholds where one looks, and away from there.
+fn of_resting_eye(
+    csf: &dyn ContrastSensitivity,
+    displayed_guide: &Plane,
+    noise: &Plane,
+    settings: &LoopSettings,
+) -> Result<ThresholdMap, JudgeError> {
+    let guide_noise = GuideNoise::BeforeDenoising(noise);
+    let inputs = ThresholdInputs { display_luminance_cd_m2: displayed_guide, guide_noise };
+    let thresholds = threshold_map(&inputs, &settings.viewing, csf)?;
+    Ok(if settings.gazes.is_empty() { thresholds } else { thresholds.with_gazes(&settings.gazes) })
+}
+
+/// Thresholds on what the eye does not follow.
+fn in_pursuit(
+    thresholds: ThresholdMap,
     guide: &Guide<'_>,
     tone: &dyn FittedTone,
     settings: &LoopSettings,
 ) -> Result<ThresholdMap, JudgeError> {
-    let thresholds = if settings.gazes.is_empty() { at_rest } else { at_rest.with_gazes(&settings.gazes) };
     let (Some(pursuit), Some(timing)) = (&settings.pursuit, settings.frames) else { return Ok(thresholds) };
     let size = (guide.luminance_cd_m2().width(), guide.luminance_cd_m2().height());
     let eye = pursuit.eye_velocity_deg_s(&guide.rgb_cd_m2, size, tone, &settings.viewing.display)?;

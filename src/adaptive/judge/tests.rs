@@ -235,7 +235,8 @@ fn noise_of_alpha_is_seen_over_white() {
     }
 }
 
-/// What a denoiser smears stays where it is from frame to frame: of a shot noise is seen less than of a still, and its bias as well.
+/// What a denoiser smears stays where it is from frame to frame: in a shot it is seen as well as in a still, where noise is seen less. What is left of
+/// that are blotches, which are hidden less than grain is: 0.88 of a still's.
 #[test]
 fn a_denoised_frame_has_the_bias_of_a_still() {
     let film = film_of(|pixel, random| Vec3::splat(0.5 + 0.3 * (pixel % 2) as f32 + 0.4 * random));
@@ -249,5 +250,5 @@ fn a_denoised_frame_has_the_bias_of_a_still() {
     let [still_bias, frame_bias] = [&still, &frame].map(|error| error.bias.mean());
     assert!(still_bias > 0.1 && (frame_bias / still_bias - 1.0).abs() < 1e-3, "{frame_bias}, {still_bias} of a still");
     let [still_noise, frame_noise] = [&still, &frame].map(|error| error.variance.mean());
-    assert!(frame_noise < 0.95 * still_noise, "noise of {frame_noise}, {still_noise} of a still");
+    assert!((0.8..0.95).contains(&(frame_noise / still_noise)), "noise of {frame_noise}, {still_noise} of a still");
 }

@@ -2,9 +2,6 @@
 
 use crate::cli::picture::InputPicture;
 
-/// What half floats hold above 0, in a file's unit.
-const SMALLEST_HALF: f64 = 6e-8;
-
 /// What a guide has of the halves.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum MadeOf {
@@ -21,6 +18,8 @@ impl MadeOf {
     /// By where the guide's values lie between the halves', in most pixels: some may have been changed since, or not be finite in one of
     /// them, and files with loss change all of them a little.
     pub(super) fn of(guide: &InputPicture, [a, b]: &[InputPicture; 2]) -> Self {
+        /// What half floats hold above 0, in a file's unit.
+        const SMALLEST_HALF: f64 = 6e-8;
         if !(guide.has_values_like(a) && guide.has_values_like(b)) {
             return Self::Else;
         }
@@ -83,16 +82,67 @@ impl Shares {
         shares
     }
 
-    /// The median, if four values of five are about as near to it as files with loss leave them. Of a clean picture between two halves as noisy as
-    /// each other three of ten are: 2/π · atan ½.
+    /// The mean of those about the median, if four values of five are about as near to that as files with loss leave them. Of a clean picture
+    /// between two halves as noisy as each other three of ten are: 2/π · atan ½. Codes five apart have a mean of two fifths, or three.
     fn common(&self) -> Option<f64> {
         const NEAR: usize = 25;
         const LEAST_SHARE: f64 = 0.8;
+        /// Fewer leave the mean of fifths to chance.
+        const LEAST_COUNT: usize = 256;
+        if self.count < LEAST_COUNT {
+            return None;
+        }
         let before = |bin: usize| self.bins[..bin].iter().sum::<usize>();
         let inside = before(Self::BINS);
         let median = (0..Self::BINS).find(|&bin| 2 * before(bin + 1) >= inside.max(1))?;
-        let near = before((median + NEAR + 1).min(Self::BINS)) - before(median.saturating_sub(NEAR));
+        let about = median.saturating_sub(NEAR)..(median + NEAR + 1).min(Self::BINS);
+        let near: usize = self.bins[about.clone()].iter().sum();
+        let sum: f64 = about.map(|bin| self.bins[bin] as f64 * (bin as f64 + 0.5)).sum();
         let is_common = near as f64 >= LEAST_SHARE * self.count as f64;
-        is_common.then_some(Self::LEAST + (median as f64 + 0.5) / Self::A_UNIT)
+        is_common.then_some(Self::LEAST + sum / near as f64 / Self::A_UNIT)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CODE: f64 = 1.0 / 255.0;
+
+    /// About normal, of a standard deviation of 1.
+    fn normal(state: &mut u64) -> f64 {
+        let mut uniform = || {
+            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (*state >> 32) as f64 / f64::from(u32::MAX)
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    /// Of a guide that is made of two halves of such noise about a light of 0.5, as files of such a step hold it.
+    fn common(guide: impl Fn(f64, f64) -> f64, deviations: [f64; 2], step: f64) -> Option<f64> {
+        let held = |value: f64| if step > 0.0 { (value / step).round() * step } else { value };
+        let mut state = 1;
+        let values = (0..4096).map(|_| {
+            let [a, b] = deviations.map(|deviation| held(0.5 + deviation * normal(&mut state)));
+            (held(guide(a, b)), (a, b))
+        });
+        Shares::of(values, 2.0 * step).common()
+    }
+
+    #[test]
+    fn a_mean_is_known_and_a_clean_picture_is_none() {
+        let mean = |a: f64, b: f64| 0.5 * (a + b);
+        let is_half = |share: Option<f64>| share.is_some_and(|share| (0.48..=0.52).contains(&share));
+        assert!(is_half(common(mean, [0.1, 0.1], 0.0)) && is_half(common(mean, [0.05, 0.05], CODE)));
+        assert!(common(|a, b| 0.7 * a + 0.3 * b, [0.1, 0.1], 0.0).is_some_and(|share| (0.69..0.71).contains(&share)));
+        for deviations in [[0.1, 0.1], [0.1, 0.02], [0.05, 0.01]] {
+            assert_eq!(common(|_, _| 0.5, deviations, 0.0), None, "{deviations:?}");
+        }
+        // Quiet codes say of a mean that it is one, or nothing.
+        for deviation in [0.2, 0.5, 1.0, 1.5, 2.0].map(|codes| codes * CODE) {
+            let found = common(mean, [deviation; 2], CODE);
+            assert!(found.is_none() || is_half(found), "{deviation}: {found:?}");
+        }
+        assert_eq!(common(mean, [0.0, 0.0], 0.0), None, "halves that are alike say nothing");
     }
 }

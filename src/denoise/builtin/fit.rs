@@ -323,6 +323,22 @@ mod tests {
         assert!((red.0[0] - 7.0).abs() < 1e-3, "{red:?}");
     }
 
+    /// To the last bit.
+    #[test]
+    fn neighbours_at_once_are_neighbours_one_by_one() {
+        let number = |of: usize, seed: usize| ((of * 7919 + seed * 104_729) % 1009) as f32 / 1009.0;
+        let lanes = |seed: usize| Lanes(std::array::from_fn(|lane| number(lane, seed)));
+        let neighbours: [Neighbour<8>; AT_ONCE] = std::array::from_fn(|n| Neighbour {
+            weight: lanes(n),
+            terms: std::array::from_fn(|term| lanes(10 * n + term)),
+            colours: std::array::from_fn(|colour| lanes(100 * n + colour)),
+        });
+        let (mut at_once, mut one_by_one) = (Equations::<8>::new(), Equations::<8>::new());
+        at_once.add(&neighbours);
+        neighbours.iter().for_each(|neighbour| one_by_one.add(std::array::from_ref(neighbour)));
+        assert_eq!((at_once.matrix, at_once.right), (one_by_one.matrix, one_by_one.right));
+    }
+
     /// One pixel alone, whose features say nothing: its own colour.
     #[test]
     fn a_pixel_alone_keeps_its_colour() {
