@@ -60,7 +60,7 @@ pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u6
 }
 
 /// Squared visibility of one sample's noise in each pixel for itself.
-struct Energies {
+pub(super) struct Energies {
     whole: Plane,
     /// As each half may go by it, where that is not the same. By what both may have missed a pixel that met a star's rim by luck was less
     /// urgent than its neighbour that did not: stars were 6.4 ± 0.7 % too bright at 64 samples a pixel (`benches/results/sampling.md`, lamps
@@ -69,7 +69,7 @@ struct Energies {
 }
 
 impl Energies {
-    fn of(film: &Film, judgement: &Judgement) -> Self {
+    pub(super) fn of(film: &Film, judgement: &Judgement) -> Self {
         let pooled = &judgement.pooled_variance_per_sample;
         match &judgement.pooled_of_halves {
             None => Self { whole: judgement.energy_of(pooled), of_halves: None },
@@ -80,7 +80,13 @@ impl Energies {
         }
     }
 
-    fn of_half(&self, half: Half) -> &[f32] {
+    /// As the whole picture is judged.
+    pub(super) fn of_both(&self) -> &[f32] {
+        self.whole.values()
+    }
+
+    /// As a half may go by it.
+    pub(super) fn of_half(&self, half: Half) -> &[f32] {
         self.of_halves.as_ref().map_or(&self.whole, |halves| &halves[half.index()]).values()
     }
 }

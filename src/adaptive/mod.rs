@@ -12,6 +12,7 @@ mod forecast;
 mod gain;
 pub mod glimpse;
 pub mod judge;
+mod leftover;
 mod limits;
 mod missed;
 mod monitor;

@@ -5,6 +5,7 @@ use super::audit::{Audit, MOST_INFLATION, audit, audit_unproven};
 use super::forecast::Forecast;
 use super::gain::{cut, most_worthwhile, while_far};
 use super::judge::{JudgeError, Judgement, judge_raw, judge_to_plan, still_wanted};
+use super::leftover::of_what_shows;
 use super::plan::{
     SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, plan_up_to, uniform_plan, wanted_samples,
 };
@@ -240,7 +241,11 @@ impl Loop<'_> {
         }
         // Each pixel by itself has what it needs, yet its surroundings show.
         let predicted = judgement.predicted.values();
-        Ok(Some(doubling_of(film, limits.max_samples, |i| f64::from(predicted[i]) / rung)))
+        Ok(Some(match judgement.thresholds.per_pixel {
+            None => of_what_shows(film, judgement, &forecast, rung, limits.max_samples),
+            // Such a model pools nothing: what shows is the pixel's own.
+            Some(_) => doubling_of(film, limits.max_samples, |i| f64::from(predicted[i]) / rung),
+        }))
     }
 
     /// More samples for single pixels that stand out of what the halves show, which pooling hides.

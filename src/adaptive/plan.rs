@@ -6,7 +6,7 @@
 
 mod blocks;
 
-pub(super) use blocks::{blocks_between, by_chance, share_of_half, slice_count};
+pub(super) use blocks::{blocks_between, by_chance, doubled_blocks, share_of_half, slice_count};
 pub use blocks::{cut_to_budget, slices};
 
 use super::forecast::Forecast;
@@ -15,7 +15,6 @@ use super::settings::{AllocationRule, Limits};
 use crate::film::Film;
 use crate::integrator::{BlockWork, PILOT_SAMPLES_A_HALF, PILOT_SAMPLES_A_PIXEL, SamplePlan};
 use crate::sampler::Half;
-use blocks::doubled_blocks;
 use fechner_perception::allocation::{AllocationProblem, allocate};
 use fechner_perception::{PIXELS_A_TASK, Plane};
 use rayon::prelude::*;
@@ -24,7 +23,7 @@ use std::ops::Range;
 /// Doublings that one plan gives a pixel at most where that costs no more than a look. Otherwise there is one: the pixel's
 /// variance, and what stratification makes of it, are looked at again in between, since stratification pays more the more
 /// samples there are.
-const MOST_DOUBLINGS_AT_ONCE: u32 = 3;
+pub(super) const MOST_DOUBLINGS_AT_ONCE: u32 = 3;
 
 /// What a look at the picture costs, in samples for every pixel, about.
 pub(super) const SAMPLES_OF_A_RAW_LOOK: f64 = 1.5;

@@ -29,7 +29,7 @@ pub(in crate::adaptive) fn share_of_half(samples: u32, half: Half) -> u32 {
 }
 
 /// The blocks that double a half of a pixel again and again, the last of them up to its share of `max_samples`.
-pub(super) fn doubled_blocks(
+pub(in crate::adaptive) fn doubled_blocks(
     pixel: u32,
     half: Half,
     mut taken: u32,
