@@ -2,7 +2,7 @@
 
 use fechner::scene::hash::content_hash;
 use fechner::scene::load::{LoadOptions, load};
-use fechner::scene::{Alpha, Scene};
+use fechner::scene::{Alpha, Scene, Surface};
 
 /// A scene in a folder of its own, at a time in seconds.
 fn at(text: &str, seconds: f64) -> Result<Scene, String> {
@@ -43,6 +43,37 @@ fn a_lamp_gives_its_power_through_what_alpha_leaves() {
     let picture = "[textures.t]\nfile = \"t.png\"\n";
     let refused = read(&format!("{picture}{}", lamp("alpha = { texture = \"t\" }"))).unwrap_err();
     assert!(refused.starts_with("s.toml:10") && refused.contains("use emission_cd_m2"), "{refused}");
+}
+
+/// A block of glass within glass took 7 % of the light: there was no way to say what is around it.
+#[test]
+fn an_index_is_relative_to_what_is_around() {
+    let relative = |indices: &str| -> Result<f32, String> {
+        let scene = read(&format!("{LIT}{}", square(&format!("type = \"dielectric\"\n{indices}"))))?;
+        match scene.materials.iter().find_map(|material| match material.surface {
+            Surface::Dielectric { ior, .. } => Some(ior),
+            _ => None,
+        }) {
+            Some(ior) => Ok(ior),
+            None => panic!("no dielectric"),
+        }
+    };
+    for (indices, expected) in [
+        ("", 1.5),
+        ("ior = 1.33", 1.33),
+        ("ior = 1.33\nior_outside = 1", 1.33),
+        ("ior = 1.5\nior_outside = 1.5", 1.0),
+        ("ior = 1\nior_outside = 1.6", 0.625),
+        ("ior_outside = 2", 0.75),
+    ] {
+        assert_eq!(relative(indices), Ok(expected), "{indices}");
+    }
+    for (outside, problem) in
+        [("0", "above 0"), ("-1", "above 0"), ("1e38", "comparable to ior"), ("\"air\"", "number")]
+    {
+        let refused = relative(&format!("ior = 1e-20\nior_outside = {outside}")).unwrap_err();
+        assert!(refused.starts_with("s.toml:6") && refused.contains(problem), "{outside}: {refused}");
+    }
 }
 
 /// A leaf whose red is 0 was invisible where its alpha is 1.

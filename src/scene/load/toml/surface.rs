@@ -40,6 +40,7 @@ const CONDUCTOR: &[&str] = &["metal", "eta", "k", "tint", "roughness", "roughnes
 
 const DIELECTRIC: &[&str] = &[
     "ior",
+    "ior_outside",
     "roughness",
     "roughness_v",
     "distribution",
@@ -163,10 +164,22 @@ fn conductor<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'
 
 fn dielectric<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
     Ok(Surface::Dielectric {
-        ior: fields.get_or("ior", f64::from(USUAL_IOR), Value::positive)? as f32,
+        ior: relative_ior(fields)?,
         roughness: roughness(context, fields, ROUGHNESS_KEYS)?,
         transmittance: share_or_white(context, fields, "transmittance")?,
         absorption: absorption(fields)?,
+    })
+}
+
+/// Index of the inside over that of what is around it.
+fn relative_ior(fields: &Fields<'_>) -> Result<f32, LoadError> {
+    let inside = fields.get_or("ior", f64::from(USUAL_IOR), Value::positive)?;
+    fields.get_or("ior_outside", inside as f32, |value| {
+        let relative = (inside / value.positive()?) as f32;
+        match relative > 0.0 && relative.is_finite() {
+            true => Ok(relative),
+            false => Err(value.error(format_args!("must be comparable to ior, {inside}"))),
+        }
     })
 }
 
