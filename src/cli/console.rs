@@ -121,10 +121,11 @@ impl Counter {
     }
 }
 
-/// "0.8 s", "42 s", "3 min 20 s", "2 h 5 min".
+/// "40 ms", "0.8 s", "42 s", "3 min 20 s", "2 h 5 min".
 pub(super) fn duration_in_words(seconds: f64) -> String {
     let (whole_seconds, whole_minutes) = (seconds.round(), (seconds / 60.0).round());
     match seconds {
+        s if (5e-4..0.095).contains(&s) => format!("{:.0} ms", s * 1e3),
         s if s < 9.95 => format!("{s:.1} s"),
         s if s < 99.5 => format!("{s:.0} s"),
         s if s < 6000.0 => format!("{:.0} min {:.0} s", (whole_seconds / 60.0).floor(), whole_seconds % 60.0),
@@ -150,8 +151,19 @@ mod tests {
     /// No 60 seconds or minutes beside the next larger unit.
     #[test]
     fn durations_are_rounded_before_they_are_split() {
-        let words = [0.84, 9.97, 42.4, 99.7, 119.7, 200.0, 5999.6, 10_799.0].map(duration_in_words);
-        let expected = ["0.8 s", "10 s", "42 s", "1 min 40 s", "2 min 0 s", "3 min 20 s", "100 min 0 s", "3 h 0 min"];
+        let words = [0.0, 0.04, 0.84, 9.97, 42.4, 99.7, 119.7, 200.0, 5999.6, 10_799.0].map(duration_in_words);
+        let expected = [
+            "0.0 s",
+            "40 ms",
+            "0.8 s",
+            "10 s",
+            "42 s",
+            "1 min 40 s",
+            "2 min 0 s",
+            "3 min 20 s",
+            "100 min 0 s",
+            "3 h 0 min",
+        ];
         assert_eq!(words, expected);
     }
 }

@@ -367,7 +367,7 @@ fn sequences_are_compared_as_they_move() {
     std::fs::remove_file(at.join("b.03.exr")).expect("removed");
     for pair in [["a.##.exr", "b.##.exr"], ["b.##.exr", "a.##.exr"]] {
         let (status, said) = compare(&[&pair[..], &["--fps", "24"]].concat());
-        let expected = "a.##.exr: frames 3 are there, and missing of b.##.exr";
+        let expected = "a.##.exr: frame 3 is there, and missing of b.##.exr";
         assert!(status == Some(2) && said.contains(expected), "{pair:?}: {said}");
     }
     let (status, said) = compare(&["a.##.exr", "a.##.exr", "--fps", "24", "--velocity", "b.##.exr"]);

@@ -6,7 +6,7 @@ use crate::cli::kept_tone::{as_rendered, first_scene};
 use crate::cli::maps::check_map;
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
 use crate::cli::targets::check_kept;
-use crate::cli::words::{OF_THE_MODEL, count};
+use crate::cli::words::{OF_THE_MODEL, count, listed};
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::animate::spread_over;
@@ -123,18 +123,15 @@ fn numbers_of(name: &FrameName, path: &Path) -> Result<Vec<u32>> {
 
 /// Refuses frames that one sequence has and another has not.
 fn check_covered((path, numbers): (&Path, &[u32]), (by_path, by): (&Path, &[u32])) -> Result<()> {
-    /// Most that are named.
-    const NAMED: usize = 5;
     let lonely: Vec<u32> = numbers.iter().copied().filter(|number| by.binary_search(number).is_err()).collect();
     if lonely.is_empty() {
         return Ok(());
     }
-    let named: Vec<String> = lonely.iter().take(NAMED).map(u32::to_string).collect();
     bail!(
-        "{}: frames {}{} are there, and missing of {}: sequences of equal frames can be compared",
+        "{}: {} {} there, and missing of {}: sequences of equal frames can be compared",
         path.display(),
-        named.join(", "),
-        if lonely.len() > NAMED { format!(" and {} more", lonely.len() - NAMED) } else { String::new() },
+        if let [one] = lonely[..] { format!("frame {one}") } else { format!("frames {}", listed(&lonely)) },
+        if lonely.len() == 1 { "is" } else { "are" },
         by_path.display()
     )
 }
