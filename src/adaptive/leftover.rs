@@ -174,6 +174,28 @@ mod tests {
         assert!(plan.blocks.iter().all(|block| block.pixel % 64 >= 32));
     }
 
+    /// Next to nothing is what faint noise around brings of what shows: it is left as it is, rather than sampled until it has all it may.
+    #[test]
+    fn faint_noise_is_left_where_the_loud_have_all_they_may() {
+        let is_near =
+            |pixel: u32, margin: u32| pixel % 64 < 6 + margin && (30 - margin..34 + margin).contains(&(pixel / 64));
+        let swing = |pixel: u32| if is_near(pixel, 0) { 0.9 } else { 0.002 };
+        let mut film = film_of(|pixel, random| Vec3::splat(1.0 + swing(pixel) * random));
+        for block in plan_up_to(&film, |pixel| if is_near(pixel as u32, 3) { 64 } else { 0 }).blocks {
+            let mut sum = BlockSum::default();
+            (0..block.samples).for_each(|index| {
+                let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
+                sum.add(&PathSample::of_wall(Vec3::splat(1.0 + swing(block.pixel) * sign)));
+            });
+            film.merge_block(block, &sum);
+        }
+        let judgement = judge(&film, &settings(), 1.0).expect("judges");
+        let rung = 0.5 * f64::from(judgement.predicted.get(3, 31));
+        let plan = |most: u32| of_what_shows(&film, &judgement, &Forecast::of(&film, &judgement), rung, most);
+        assert!(plan(64).blocks.is_empty(), "{} blocks", plan(64).blocks.len());
+        assert!(!plan(128).blocks.is_empty());
+    }
+
     #[test]
     fn half_of_all_is_found_among_the_greatest() {
         assert_eq!(least_of_most(&[1.0, 0.0, 5.0, 3.0, 1.0]), Some(5.0));
