@@ -4,7 +4,7 @@
         --arms uniform,as-asked,uniform-equal-time,to-threshold -o FOLDER
     python benches/equal_time.py FOLDER
 
-prints the table of `benches/results/sampling.md`. In an arm's time uniform sampling takes the arm's samples over one less the arm's
+prints the table of `benches/results/equal-time.md`. In an arm's time uniform sampling takes the arm's samples over one less the arm's
 `overhead`, the share of time outside of the tracer; where it ends with a look, as the arm does and as its report needs,
 times one less the share of the arm's last look. Its FLIP there is that of the arm `uniform-equal-time` by FLIP_POWER, its
 JOD by the line through that arm and `uniform` over the logarithm of samples, or by JOD_SLOPE where the two are too close.

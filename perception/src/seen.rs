@@ -58,7 +58,7 @@ pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance
 ///
 /// Of a point lamp 6 cm below a ceiling 16 samples a pixel leave noise of visibility 19.7 ± 2.0 by the thresholds of the
 /// converged picture, 14 by its comparison: by the three points alone it was told as 10.8, by M + σ alone as 26.2, and is
-/// as 19.9 (`benches/results/sampling.md`).
+/// as 19.9 (`benches/results/beyond-white.md`).
 ///
 /// Where normal noise (√3 σ ≤ M) reaches over a clip of the display, three points see too much of it or nothing at all; there the
 /// operator is asked at 21 points, −4σ to 4σ.

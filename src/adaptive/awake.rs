@@ -2,7 +2,7 @@
 //!
 //! A look at a small picture is a hundred steps of a tenth of a millisecond, each cut in two or more. An idle thread of the pool sleeps
 //! after a few microseconds and takes as long to wake as its half of a step takes: the look at 128×128 that ends a render takes 4.85 % of
-//! the time of tracing with two threads, and 5.18 without this (`benches/results/sampling.md`). Not for work in large pieces.
+//! the time of tracing with two threads, and 5.18 without this (`benches/results/equal-time.md`). Not for work in large pieces.
 
 use rayon::Yield;
 use std::sync::atomic::{AtomicBool, Ordering};

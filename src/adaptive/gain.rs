@@ -17,7 +17,7 @@ pub(super) const GROWTH: f64 = 0.5;
 pub(super) const EVEN_ENOUGH: f64 = 0.95;
 /// The same of raw pictures on the way to a far rung: between the Cornell box (0.95 to 0.96), whose squared error was 0.90 ± 0.03 of
 /// even counts' when this was chosen and is 1.04 ± 0.02 by present masks, and the product shot (0.98), where even counts have 9.875 JOD
-/// at 96 samples and uneven ones 9.834 (`benches/results/sampling.md`).
+/// at 96 samples and uneven ones 9.834 (`benches/results/equal-time.md`).
 const EVEN_ENOUGH_WHILE_FAR: f64 = 0.97;
 /// Samples for every pixel up to which a plan is never cut: less would hardly pay for the look before it.
 const LEAST_UNCUT: f64 = 16.0;
@@ -63,7 +63,7 @@ pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u6
 pub(super) struct Energies {
     whole: Plane,
     /// As each half may go by it, where that is not the same. By what both may have missed a pixel that met a star's rim by luck was less
-    /// urgent than its neighbour that did not: stars were 6.4 ± 0.7 % too bright at 64 samples a pixel (`benches/results/sampling.md`, lamps
+    /// urgent than its neighbour that did not: stars were 6.4 ± 0.7 % too bright at 64 samples a pixel (`benches/results/energy.md`, lamps
     /// on black).
     of_halves: Option<[Plane; 2]>,
 }
@@ -104,11 +104,11 @@ fn with_unmet_alike(film: &Film, mut energies: Plane) -> Plane {
 
 /// What one more sample takes away of a half's share of its pixel's visible energy, e/n: by its own count n, not the pixel's. The other half's
 /// count was decided by this one's samples, and by both a half that was lucky stayed as it was, while the other one grew: the sun
-/// through blinds made a room 0.8 % too bright (`benches/results/sampling.md`, energy).
+/// through blinds made a room 0.8 % too bright (`benches/results/energy.md`).
 ///
 /// Samples that go where it is most make counts that go as √e and leave the least mean energy (Neyman 1934) of known variances.
 /// Counts for equal visibility go as e: at 96 samples a pixel of the Cornell box their FLIP was 1.09 times that of even counts, with
-/// these it is 1.015 (`benches/results/sampling.md`).
+/// these it is 1.015 (`benches/results/equal-time.md`).
 fn gains(film: &Film, energies: &Energies) -> impl Fn(&BlockWork) -> f32 {
     let defended = Half::BOTH.map(|half| defended(energies.of_half(half)));
     move |block| {

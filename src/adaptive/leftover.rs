@@ -24,7 +24,7 @@ const MOST_ENERGY: f32 = 1e25;
 /// it. For a model that pools.
 ///
 /// Every pixel around which noise showed was doubled before: of a sky behind the sun's disc, which has none, pixels had 262,144 samples, and a
-/// picture that takes 28 a pixel took 362 (`benches/results/sampling.md`, whose noise shows).
+/// picture that takes 28 a pixel took 362 (`benches/results/energy.md`, whose noise shows).
 pub(super) fn of_what_shows(
     film: &Film,
     judgement: &Judgement,

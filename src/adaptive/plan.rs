@@ -224,7 +224,7 @@ const MARGINS: [f64; 6] = [1.0, 1.05, 1.1, 1.2, 1.4, 1.8];
 fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own: [f32; 2], haste: Haste) -> [u32; 2] {
     // A half that falls far behind makes the other's samples worthless, yet one that follows is decided by its own data after all,
     // through the other's count: on the lognormal field of the tests a lag of at most one doubling costs 0.50 % of the energy, two
-    // 0.24 %, any 0.14 % (each ± 0.12), on a caustic two cost 0.32 %, any 0.27 % (± 0.06), for level samples (`benches/results/sampling.md`).
+    // 0.24 %, any 0.14 % (each ± 0.12), on a caustic two cost 0.32 %, any 0.27 % (± 0.06), for level samples (`benches/results/energy.md`).
     Half::BOTH.map(|half| {
         let taken = film.half(half)[pixel].taken.max(1);
         let harder = if pooled > 0.0 { f64::from(own[half.index()] / pooled).max(1.0).sqrt() } else { 1.0 };
@@ -237,7 +237,7 @@ fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own:
 /// and one more, since it is what a single pixel of the halves' difference says, while they are next to nothing of the film's samples;
 /// else one.
 ///
-/// Asked for one to three at once without regard to the excess, a lamp's edge took seven looks for six pixels (`benches/results/sampling.md`).
+/// Asked for one to three at once without regard to the excess, a lamp's edge took seven looks for six pixels (`benches/results/equal-time.md`).
 pub fn doubling_of(film: &Film, max_samples: u32, excess: impl Fn(usize) -> f64 + Sync) -> SamplePlan {
     let doublings = |pixel: usize, most: u32| {
         let excess = excess(pixel);

@@ -217,7 +217,7 @@ const HIGHEST_RUNG: f64 = 16.0;
 /// Visibility at threshold, as [`fechner_perception`] counts.
 ///
 /// On the way to it or below there is no rung above it: each leaves a picture that is equally visible everywhere, which is the
-/// cheapest when it is the last, but not the best when it is not (`benches/results/sampling.md`).
+/// cheapest when it is the last, but not the best when it is not (`benches/results/equal-time.md`).
 pub const THRESHOLD: f64 = 1.0;
 
 /// Below it nothing is in between.

@@ -61,7 +61,7 @@ impl SampleStatistics {
     }
 
     /// The same, with the halves' differences as the display shows them. Of what is mostly beyond white, variance times a scale tells up to 7
-    /// times the noise that is seen (`benches/results/sampling.md`, what moves the mean).
+    /// times the noise that is seen (`benches/results/beyond-white.md`).
     pub fn of_displayed(film: &Film, scale: &[Plane; CHANNELS], difference: &DifferenceOnDisplay) -> Self {
         let DifferenceOnDisplay { squared, expected, most_factor } = difference;
         Self::by(film, scale, *most_factor, |pixel, mut evidence| {

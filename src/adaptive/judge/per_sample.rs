@@ -64,7 +64,7 @@ impl PerSample {
 
     /// Or by what lamps' rims may hide, where that is more: of what a half decides by, beside the light that the other one has found; of the
     /// whole, the mean of what each says. By the light of both a pixel that was lucky was called beyond white and done, and the others not: a
-    /// small lamp that moves made a picture 19 % too bright (`benches/results/sampling.md`, energy).
+    /// small lamp that moves made a picture 19 % too bright (`benches/results/energy.md`).
     fn or_missed(self, lights: &[FoundLight; 2], missed_beside: impl Fn(&FoundLight) -> Option<MissedNoise>) -> Self {
         let [Some(a), Some(b)] = lights.each_ref().map(missed_beside) else { return self };
         let of_halves = self.of_halves.map(|[of_a, of_b]| [b.or_scatter(&of_a), a.or_scatter(&of_b)]);

@@ -120,7 +120,7 @@ impl Scatter {
 
     /// Displayed over scene variance by channel for what each half decides by: of the other half's light and noise. Where both halves' went
     /// in, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
-    /// tube of light made a picture 2.75 % too bright (`benches/results/sampling.md`, lamps on black, dust and wires). Of both are still which pixels shine, how
+    /// tube of light made a picture 2.75 % too bright (`benches/results/energy.md`). Of both are still which pixels shine, how
     /// many samples there are, the guide's hues and what the operator leaves of tints on it, and what is seen over white. `lights`: of the halves.
     pub(super) fn scales_of_halves(
         &self,
