@@ -160,24 +160,38 @@ impl<'a> NoiseShown<'a> {
     /// What is not finite, or of negative variance, gets infinity; colour also where luminance's variance is so.
     #[must_use]
     pub fn opponent_variances(&self, pixel: Pixel, mean: f32, colour: SceneColour, scene: [f32; 3]) -> [f32; 3] {
-        let is_variance = |variance: f32| variance.is_finite() && variance >= 0.0;
         let [luminance, red_green, yellow_violet] = scene;
         if !mean.is_finite() || !is_variance(luminance) {
             return [f32::INFINITY; 3];
         }
         let noise = Noise { mean: f64::from(mean.max(0.0)), variance: f64::from(luminance) };
         let of_scene = [red_green, yellow_violet];
+        let tints = of_scene.map(|variance| colour.chromatic_slope * colour.chromatic_slope * variance);
+        if let Some(luminance) = self.shown.variance_within_display(noise, colour.rgb, tints, self.rooms_cd_m2) {
+            return told(scene, [luminance, tints[0], tints[1]]);
+        }
         let found = if self.shown.fitted.without_colours().is_none() {
             let noisy = self.shown.pixel(pixel, noise);
-            let slope = colour.chromatic_slope;
-            let tints = noisy.within_rooms(of_scene.map(|variance| slope * slope * variance), self.rooms_cd_m2);
+            let tints = noisy.within_rooms(tints, self.rooms_cd_m2);
             let paling = noisy.variances_of_paling(colour.rgb);
             [noisy.variance(), tints[0].max(paling[0]), tints[1].max(paling[1])]
         } else {
             variances_of_colour(&self.shown, pixel, noise, colour.rgb, of_scene)
         };
-        std::array::from_fn(|c| if is_variance(scene[c]) && found[c].is_finite() { found[c] } else { f32::INFINITY })
+        told(scene, found)
     }
+}
+
+/// Whether this can be one: finite and not negative.
+fn is_variance(variance: f32) -> bool {
+    variance.is_finite() && variance >= 0.0
+}
+
+/// Displayed variances, infinite where those of the scene are none.
+fn told(scene: [f32; 3], displayed: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(
+        |c| if is_variance(scene[c]) && displayed[c].is_finite() { displayed[c] } else { f32::INFINITY },
+    )
 }
 
 /// What of a colour, linear Rec. 709 RGB in scene cd/m², the display shows at `pixel`, cd/m²: more than where it shows nothing.

@@ -21,6 +21,9 @@ static NORMAL_POINTS: LazyLock<[(f64, f64); 2 * STEPS + 1]> = LazyLock::new(|| {
     })
 });
 
+/// Display light that is white: an operator that clips by itself may round.
+const WHITE: f32 = 1.0 - 1e-6;
+
 /// A display behind an operator.
 pub(super) struct Shown<'a> {
     pub(super) fitted: &'a dyn FittedTone,
@@ -76,6 +79,31 @@ impl Shown<'_> {
             self.opponent(pixel, hue.map(|channel| (noise.mean * f64::from(channel) + grey).max(0.0) as f32))
         };
         Points::of(noise, light).map_or([0.0; 3], |shown| variances_of_opponent(&shown, noise))
+    }
+
+    /// Variance of the displayed luminance, (cd/m²)², where the operator multiplies by one number and nothing of the noise reaches what the
+    /// display cannot show, on a colour of which no channel does: the slope's square times the scene's, of which all that
+    /// [`NoisyPixel`] asks at three points and more comes to the same. `None` elsewhere. `tints`: variances of both chromatic signals,
+    /// of which none may reach beyond its room, `rooms_cd_m2` of black.
+    pub(super) fn variance_within_display(
+        &self,
+        noise: Noise,
+        rgb: [f32; 3],
+        tints: [f32; 2],
+        rooms_cd_m2: [f64; 2],
+    ) -> Option<f32> {
+        let scale = self.fitted.relative_per_cd_m2()?;
+        let Noise { mean, variance } = noise;
+        let is_normal = noise.is_normal();
+        let reach = if is_normal { FARTHEST * noise.deviation() } else { 3.0 * variance / mean };
+        let brightest = scale * (mean + reach);
+        let strength = luminance(rgb);
+        let largest = if strength > 0.0 { rgb.into_iter().fold(0.0, f32::max) / strength } else { 1.0 };
+        let fits = |signal: usize| f64::from(tints[signal]) <= ((1.0 - brightest) * rooms_cd_m2[signal]).powi(2);
+        let is_within =
+            brightest < f64::from(WHITE) && brightest * f64::from(largest) <= 1.0 && (!is_normal || fits(0) && fits(1));
+        let slope = f64::from(self.span_cd_m2()) * scale;
+        is_within.then(|| (slope * slope * variance) as f32)
     }
 
     fn relative(&self, pixel: Pixel, scene_cd_m2: f64) -> f32 {
@@ -145,7 +173,8 @@ impl<T: Copy> Points<T> {
         let Self { below, above, .. } = *self;
         let outer = [below, above].map(|distance| noise.variance / (distance * (below + above)));
         let weights = [outer[0], 1.0 - outer[0] - outer[1], outer[1]];
-        variance_of(weights.into_iter().zip(self.shown.map(|shown| f64::from(of(shown)))))
+        let shown = self.shown.map(|shown| f64::from(of(shown)));
+        variance_of([0, 1, 2].map(|point| (weights[point], shown[point])))
     }
 
     /// Variance of something that is shown, of which half is what a standard deviation shows where few samples bring the light: see
@@ -162,11 +191,11 @@ impl<T: Copy> Points<T> {
     }
 }
 
-/// Variance of values by what they weigh.
-fn variance_of(weighted: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
-    let total: f64 = weighted.clone().map(|(weight, _)| weight).sum();
-    let mean = weighted.clone().map(|(weight, value)| weight * value).sum::<f64>() / total;
-    weighted.map(|(weight, value)| weight * (value - mean) * (value - mean)).sum::<f64>() / total
+/// Variance of values, each behind what it weighs.
+fn variance_of<const POINTS: usize>(weighted: [(f64, f64); POINTS]) -> f64 {
+    let total: f64 = weighted.iter().map(|(weight, _)| weight).sum();
+    let mean = weighted.iter().map(|(weight, value)| weight * value).sum::<f64>() / total;
+    weighted.iter().map(|(weight, value)| weight * (value - mean) * (value - mean)).sum::<f64>() / total
 }
 
 /// Variances of luminance, red–green and yellow–violet, (cd/m²)², of a colour whose light is noisy.
@@ -252,8 +281,6 @@ impl NoisyPixel<'_> {
 
     /// Whether normal noise reaches over a clip of the display. `relative`: below, at and above the mean.
     fn clip_is_in_reach(&self, [low, center, high]: [f32; 3]) -> bool {
-        // An operator that clips by itself may round.
-        const WHITE: f32 = 1.0 - 1e-6;
         let Noise { mean, .. } = self.noise;
         let deviation = self.noise.deviation();
         if low >= WHITE {
@@ -274,9 +301,9 @@ impl NoisyPixel<'_> {
     }
 
     /// Luminances of normal noise, cd/m², and what they weigh. No light is below 0, which who asks has to see to.
-    fn normal_points(&self) -> impl Iterator<Item = (f64, f64)> + Clone {
+    fn normal_points(&self) -> [(f64, f64); 2 * STEPS + 1] {
         let (mean, deviation) = (self.noise.mean, self.noise.deviation());
-        NORMAL_POINTS.iter().map(move |&(deviations, weight)| (mean + deviations * deviation, weight))
+        NORMAL_POINTS.map(|(deviations, weight)| (mean + deviations * deviation, weight))
     }
 
     /// Whether normal noise leaves nothing below white.

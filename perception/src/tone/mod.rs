@@ -178,6 +178,12 @@ pub trait FittedTone: Send + Sync + Debug {
         self.relative_luminance_at(pixel, luminance).min(1.0) / luminance
     }
 
+    /// Display light, 0 to 1 and on, for each cd/m² of the scene, where that is one number for all greys of the picture; `None` where greys
+    /// are bent.
+    fn relative_per_cd_m2(&self) -> Option<f64> {
+        None
+    }
+
     /// Whether every colour is shown as bright as a grey of its luminance, and so as white where that is. Not where each channel is bent
     /// or clipped by itself: a blue of any luminance stays blue ([`coloured()`]).
     fn keeps_luminance(&self) -> bool {

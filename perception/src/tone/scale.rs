@@ -21,6 +21,10 @@ impl FittedTone for Scale {
         finite(f64::from(scene_cd_m2.max(0.0)) * self.relative_per_cd_m2)
     }
 
+    fn relative_per_cd_m2(&self) -> Option<f64> {
+        Some(self.relative_per_cd_m2)
+    }
+
     fn describe(&self) -> String {
         format!("{}: white at {} cd/m² of the scene", self.operator, Shown(self.relative_per_cd_m2.recip()))
     }
