@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import subprocess
+import time
 from pathlib import Path
 
 CALL_AGAIN = 75
@@ -32,7 +33,11 @@ def _run(program: str, folder: str, words: list[str]) -> None:
     """Runs one command on a worker. What it says on failure becomes the task's exception."""
     for _ in range(3):
         done = subprocess.run([program, "farm", words[0], folder, *words[1:]], capture_output=True, text=True)
-        if done.returncode == 0 or (done.returncode == CALL_AGAIN and words[0] == "merge"):
+        if done.returncode == CALL_AGAIN and words[0] == "merge":
+            # Somebody else is at it: who looks at once how far it is would ask for it again, over and over.
+            time.sleep(1)
+            return
+        if done.returncode == 0:
             return
         if done.returncode != CALL_AGAIN:
             break

@@ -2,7 +2,8 @@
 
 use fechner_perception::photometry::{luminance, scotopic_luminance};
 use fechner_perception::tone::{
-    AdaptationScope, FittedTone, Pixel, SceneGuide, ToneSettings, map_picture, operator_named, operator_names,
+    AdaptationScope, Effects, FittedTone, Pixel, SceneGuide, ToneSettings, coloured, map_picture, operator_named,
+    operator_names,
 };
 use fechner_perception::{Plane, display, seen};
 use numpy::{PyArray2, PyArray3};
@@ -31,10 +32,12 @@ pub(crate) struct Tone {
 ///
 /// scene: linear Rec. 709 RGB (height, width, 3) or luminance (height, width), scene cd/m². exposure_stops multiplies light by
 /// 2^stops (between -100 and 100). local: adapted at each pixel, for the operators that know it (others take no notice). gaze:
-/// (column, row) the eye rests on, for operators whose eye adapts to what it looks at.
+/// (column, row) the eye rests on, for operators whose eye adapts to what it looks at. acuity: whether `map` takes out the fine
+/// detail that an eye loses in dim light, for ferwerda96, which does unless told otherwise, and ward-larson97, which does not.
 /// ValueError for a name that there is not and for luminance below 0 and light that is not finite.
 #[pyfunction]
-#[pyo3(signature = (scene, name, viewing = None, *, exposure_stops = 0.0, local = false, gaze = None))]
+#[pyo3(signature = (scene, name, viewing = None, *, exposure_stops = 0.0, local = false, gaze = None, acuity = None))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn fit_tone(
     py: Python<'_>,
     scene: &Bound<'_, PyAny>,
@@ -43,9 +46,11 @@ pub(crate) fn fit_tone(
     exposure_stops: f64,
     local: bool,
     gaze: Option<(i64, i64)>,
+    acuity: Option<bool>,
 ) -> PyResult<Tone> {
     let scope = if local { AdaptationScope::Local } else { AdaptationScope::World };
-    let settings = ToneSettings { exposure_stops, scope, effects: None };
+    let effects = acuity.map(|acuity| Effects { acuity, ..Effects::default() });
+    let settings = ToneSettings { exposure_stops, scope, effects };
     let operator = operator_named(name, &settings).map_err(value_error)?;
     if !(-100.0..=100.0).contains(&exposure_stops) {
         return Err(PyValueError::new_err(format!(
@@ -119,27 +124,43 @@ impl Tone {
         check_size(what, &plane, self.shape.width, self.shape.height)?;
         Ok(plane)
     }
+
+    fn rgb_of_its_size<'a>(&self, pixels: &'a Pixels<'_>) -> PyResult<&'a [[f32; 3]]> {
+        let (found, rgb) = pixels.rgb()?;
+        if found == self.shape {
+            return Ok(rgb);
+        }
+        Err(PyValueError::new_err(format!(
+            "rgb has the shape ({}, {}, 3), but ({}, {}, 3) is needed",
+            found.height, found.width, self.shape.height, self.shape.width
+        )))
+    }
 }
 
 #[pymethods]
 impl Tone {
-    /// Linear display RGB 0..1, (height, width, 3), for linear Rec. 709 RGB in scene cd/m² of the same shape. Infinite channels are
-    /// very bright, negative ones and those that are no number dark.
-    fn map<'py>(&self, py: Python<'py>, rgb: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    /// This operator, whose display_luminance, display_variance and display_half_difference are of the picture's own colours, rgb
+    /// (height, width, 3), and not of greys: for srgb, linear, agx and pbr-neutral, which bend or clip each channel by itself. Others
+    /// show every colour as bright as its grey, except those with rods (ferwerda96, durand-dorsey00, pattanaik00), which in dim
+    /// light show blue brighter than these functions say.
+    fn coloured(&self, py: Python<'_>, rgb: &Bound<'_, PyAny>) -> PyResult<Self> {
         let pixels = Pixels::borrow("rgb", rgb)?;
-        let (shape, rgb) = pixels.rgb()?;
-        if shape != self.shape {
-            let (found, fitted) = (shape, self.shape);
-            return Err(PyValueError::new_err(format!(
-                "rgb has the shape ({}, {}, 3), but ({}, {}, 3) is needed",
-                found.height, found.width, fitted.height, fitted.width
-            )));
-        }
-        let shown = work(py, || map_picture(&*self.fitted, shape.width, rgb))?;
-        rgb_to_array(py, shape, shown)
+        let rgb = self.rgb_of_its_size(&pixels)?;
+        let fitted = work(py, || coloured(self.fitted.save().restore(), self.shape.width, rgb))?;
+        Ok(Self { fitted, display: self.display.clone(), shape: self.shape })
     }
 
-    /// Luminance that the display shows, cd/m², for scene luminance, cd/m²; both (height, width).
+    /// Linear display RGB 0..1, (height, width, 3), for linear Rec. 709 RGB in scene cd/m² of the same shape. Infinite channels are
+    /// very bright, negative ones and those that are no number dark; where fine detail is lost (acuity) all of these are dark.
+    fn map<'py>(&self, py: Python<'py>, rgb: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let pixels = Pixels::borrow("rgb", rgb)?;
+        let rgb = self.rgb_of_its_size(&pixels)?;
+        let shown = work(py, || map_picture(&*self.fitted, self.shape.width, rgb))?;
+        rgb_to_array(py, self.shape, shown)
+    }
+
+    /// Luminance that the display shows, cd/m², for scene luminance, cd/m², of greys (see coloured); both (height, width). Without
+    /// the loss of fine detail that map shows with acuity.
     fn display_luminance<'py>(
         &self,
         py: Python<'py>,
@@ -196,5 +217,5 @@ pub(crate) fn tone_map<'py>(
     exposure_stops: f64,
     local: bool,
 ) -> PyResult<Bound<'py, PyArray3<f32>>> {
-    fit_tone(py, rgb, name, viewing, exposure_stops, local, None)?.map(py, rgb)
+    fit_tone(py, rgb, name, viewing, exposure_stops, local, None, None)?.map(py, rgb)
 }

@@ -114,6 +114,27 @@ def test_error_through_a_linear_operator_scales():
     assert "absolute" in repr(tone) or tone.describe()
 
 
+@pytest.mark.parametrize("name", ["agx", "pbr-neutral", "srgb", "linear"])
+def test_coloured_operators_tell_what_is_shown(name):
+    blue = np.broadcast_to(np.array([2, 5, 300], np.float32), (8, 8, 3))
+    tone = fechner.fit_tone(blue, name)
+    display = fechner.Viewing().display
+    black, white = display.black_cd_m2, display.white_cd_m2
+    shown = black + (white - black) * fechner.luminance(tone.map(blue))[0, 0]
+    of_colours = tone.coloured(blue).display_luminance(fechner.luminance(blue))[0, 0]
+    assert of_colours == pytest.approx(shown, rel=1e-3)
+    assert tone.display_luminance(fechner.luminance(blue))[0, 0] != pytest.approx(shown, rel=0.05)
+    with pytest.raises(ValueError, match=r"rgb has the shape \(4, 8, 3\)"):
+        tone.coloured(blue[:4])
+
+
+def test_fine_detail_is_lost_in_dim_light_unless_told_otherwise():
+    checks = np.indices((32, 32)).sum(axis=0) % 2 * 0.02
+    rgb = checks.astype(np.float32)[..., None].repeat(3, axis=2)
+    contrast = [fechner.fit_tone(rgb, "ferwerda96", acuity=acuity).map(rgb).std() for acuity in (None, True, False)]
+    assert contrast[0] == contrast[1] < 0.1 * contrast[2]
+
+
 def test_a_guide_loses_its_noise():
     rng = np.random.default_rng(3)
     rgb = np.maximum(rng.normal(50, 10, (64, 64, 1)), 0).astype(np.float32).repeat(3, axis=2)
