@@ -91,17 +91,56 @@ pub fn sensitivity_left(channel: Channel, freq_cpd: f64, eccentricity_deg: f64) 
 /// [`GAZE_MARGIN_DEG`].
 #[must_use]
 pub fn eccentricity_deg(width: usize, height: usize, gaze: Gaze, density: PixelDensity) -> Plane {
-    let per_unit = [density.horizontal, density.vertical].map(|pixels_per_degree| pixels_per_degree.to_degrees());
-    let middle = [0.5 * width as f64, 0.5 * height as f64];
-    let ray = |x: f64, y: f64| [(x - middle[0]) / per_unit[0], (y - middle[1]) / per_unit[1], 1.0];
-    let at = ray(gaze.x_px, gaze.y_px);
+    let display = FlatDisplay::new(width, height, density);
     Plane::from_fn(width, height, |x, y| {
-        let to = ray(x as f64 + 0.5, y as f64 + 0.5);
-        let cross = [at[1] - to[1], to[0] - at[0], at[0] * to[1] - at[1] * to[0]];
-        let sine = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
-        let cosine = at[0] * to[0] + at[1] * to[1] + 1.0;
-        (sine.atan2(cosine).to_degrees() - GAZE_MARGIN_DEG).max(0.0) as f32
+        let pixel = Gaze { x_px: x as f64 + 0.5, y_px: y as f64 + 0.5 };
+        (display.angle_deg(gaze, pixel) - GAZE_MARGIN_DEG).max(0.0) as f32
     })
+}
+
+/// A picture on a flat display whose middle is straight ahead of the eye: towards its borders a degree holds more pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct FlatDisplay {
+    middle_px: [f64; 2],
+    /// Pixels as far as the display is away.
+    distance_px: [f64; 2],
+}
+
+impl FlatDisplay {
+    /// A picture of so many pixels, of `density` in its middle.
+    #[must_use]
+    pub fn new(width: usize, height: usize, density: PixelDensity) -> Self {
+        Self {
+            middle_px: [0.5 * width as f64, 0.5 * height as f64],
+            distance_px: [density.horizontal, density.vertical].map(f64::to_degrees),
+        }
+    }
+
+    /// A place in units of the distance from the eye.
+    fn place(&self, at: Gaze) -> [f64; 2] {
+        [(at.x_px - self.middle_px[0]) / self.distance_px[0], (at.y_px - self.middle_px[1]) / self.distance_px[1]]
+    }
+
+    /// Angle between two places, degrees.
+    #[must_use]
+    pub fn angle_deg(&self, from: Gaze, to: Gaze) -> f64 {
+        let (from, to) = (self.place(from), self.place(to));
+        let cross = [from[1] - to[1], to[0] - from[0], from[0] * to[1] - from[1] * to[0]];
+        let sine = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let cosine = from[0] * to[0] + from[1] * to[1] + 1.0;
+        sine.atan2(cosine).to_degrees()
+    }
+
+    /// Degrees of a small motion of so many pixels at a place: φ from straight ahead cos² φ of what it would be there where it leads
+    /// outwards, cos φ of it where it leads around.
+    #[must_use]
+    pub fn motion_deg(&self, at: Gaze, motion_px: [f64; 2]) -> f64 {
+        let at = self.place(at);
+        let motion = [motion_px[0] / self.distance_px[0], motion_px[1] / self.distance_px[1]];
+        let around = at[0] * motion[1] - at[1] * motion[0];
+        let across = motion[0].hypot(motion[1]).hypot(around);
+        (across / (1.0 + at[0] * at[0] + at[1] * at[1])).to_degrees()
+    }
 }
 
 /// What is left of the energy of noise against eccentricity.

@@ -3,6 +3,7 @@
 use crate::csf::pursued_noise::PursuedNoise;
 use crate::csf::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, FrameTiming, PURSUIT_GAIN};
 use crate::display::Display;
+use crate::eccentricity::{FlatDisplay, Gaze};
 use crate::error::Error;
 use crate::noise_gain::noise_gain;
 use crate::plane::Plane;
@@ -58,7 +59,8 @@ impl ErrorMotion {
     }
 }
 
-/// Speed over the picture, deg/s, of motion in pixels a frame, on a display of these frames a second and pixels a degree.
+/// Speed over the picture, deg/s, of motion in pixels a frame, on a flat display of these frames a second and pixels a degree whose middle is
+/// that of the picture ([`FlatDisplay`]).
 ///
 /// Each pixel takes the slowest speed of its 3×3 neighbourhood: at a silhouette the slower side's error is the one that
 /// could be seen. Motion that is not finite counts as none.
@@ -76,11 +78,12 @@ impl ErrorMotion {
 pub fn image_velocity_deg_s(motion_x_px: &Plane, motion_y_px: &Plane, display: &Display) -> Result<Plane, Error> {
     display.check()?;
     motion_y_px.check_size("vertical motion", motion_x_px.width(), motion_x_px.height())?;
-    let density = display.pixel_density();
-    let scale = |pixels_per_degree: f64| (display.frames_per_second / pixels_per_degree) as f32;
-    let (scale_x, scale_y) = (scale(density.horizontal), scale(density.vertical));
-    let speed = motion_x_px.combined(motion_y_px, |x, y| {
-        let speed = (x * scale_x).hypot(y * scale_y);
+    let (width, height) = (motion_x_px.width(), motion_x_px.height());
+    let flat = FlatDisplay::new(width, height, display.pixel_density());
+    let speed = Plane::from_fn(width, height, |x, y| {
+        let pixel = Gaze { x_px: x as f64 + 0.5, y_px: y as f64 + 0.5 };
+        let motion_px = [motion_x_px.get(x, y), motion_y_px.get(x, y)].map(f64::from);
+        let speed = (display.frames_per_second * flat.motion_deg(pixel, motion_px)) as f32;
         if speed.is_finite() { speed } else { 0.0 }
     });
     Ok(crate::filter::erode(&speed, 1))
@@ -163,6 +166,25 @@ mod tests {
         }
         let (wide, narrow) = (Plane::filled(3, 3, 0.0), Plane::filled(2, 3, 0.0));
         assert!(image_velocity_deg_s(&wide, &narrow, &Display::default()).is_err());
+    }
+
+    /// By the angle between where something is seen half a frame before and after: of 3840 columns at 30 to a degree the border is 48° from the
+    /// middle, where a pan is 0.44 of its speed and a tilt 0.67.
+    #[test]
+    fn borders_of_wide_displays_are_slower() {
+        let display = Display { pixels_per_degree: 30.0, frames_per_second: 24.0, ..Display::default() };
+        let (motion, none) = (Plane::filled(3840, 3, 4.0), Plane::filled(3840, 3, 0.0));
+        let flat = FlatDisplay::new(3840, 3, display.pixel_density());
+        for (right, down, [dx, dy], share) in [(&motion, &none, [2.0, 0.0], 0.445), (&none, &motion, [0.0, 2.0], 0.667)]
+        {
+            let speed = image_velocity_deg_s(right, down, &display).unwrap();
+            assert!((speed.get(1920, 1) - 3.2).abs() < 1e-5);
+            assert!((speed.get(1, 1) / 3.2 - share).abs() < 1e-3, "{}", speed.get(1, 1) / 3.2);
+            // The slowest of the pixels around is the one at the border.
+            let at = |sign: f64| Gaze { x_px: 0.5 + sign * dx, y_px: 1.5 + sign * dy };
+            let seen = 24.0 * flat.angle_deg(at(-1.0), at(1.0));
+            assert!((f64::from(speed.get(1, 1)) / seen - 1.0).abs() < 1e-4, "{} for {seen}", speed.get(1, 1));
+        }
     }
 
     #[test]

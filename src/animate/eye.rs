@@ -4,6 +4,7 @@ use super::ShotSettings;
 use super::velocity::VelocityMap;
 use crate::adaptive::pursuit::Pursuit;
 use fechner_perception::display::Display;
+use fechner_perception::eccentricity::FlatDisplay;
 use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::{Error, Plane};
 use glam::Vec2;
@@ -61,10 +62,9 @@ impl ShotSettings {
         };
         at(frame)?;
         let (before, after) = (at(frame.checked_sub(1)?)?, at(frame.checked_add(1)?)?);
-        let density = self.viewing.display.pixel_density();
-        let moved_deg =
-            ((after.x_px - before.x_px) / density.horizontal).hypot((after.y_px - before.y_px) / density.vertical);
-        Some(0.5 * moved_deg * self.frames_per_second)
+        let area = self.trace.film_area();
+        let flat = FlatDisplay::new(area.width as usize, area.height as usize, self.viewing.display.pixel_density());
+        Some(0.5 * flat.angle_deg(before, after) * self.frames_per_second)
     }
 
     /// The display at the shot's own rate.
