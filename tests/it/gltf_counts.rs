@@ -130,6 +130,25 @@ fn attributes_of_another_length_are_refused() {
     }
 }
 
+/// Joints that mirror turn corners round: faces looked inwards, so that glass took the outside for its inside.
+#[test]
+fn mirrored_skins_keep_their_outside() {
+    for scale in [[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -2.0, 1.0], [1.0, -1.0, 0.5]] {
+        let mut file = File::new();
+        file.attribute("NORMAL", &[[0.0, 0.0, 1.0]; 4]);
+        file.skin(0.0, 4);
+        file.document["nodes"][1]["scale"] = json!(scale);
+        let scene = file.load().unwrap();
+        let mesh = &scene.meshes[0];
+        assert_eq!(mesh.triangles.len(), 2);
+        for corners in &mesh.triangles {
+            let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);
+            let outwards = (b - a).cross(c - a).dot(mesh.normals[corners[0] as usize]);
+            assert!(outwards > 0.0, "{scale:?}: {outwards}");
+        }
+    }
+}
+
 /// WebP stands beside a picture for other programs, or alone.
 #[test]
 fn webp_textures_are_read_in_place_of_the_other() {

@@ -62,6 +62,11 @@ pub(super) fn skin(
             }
         }
     }
+    let mirrors = |&vertex: &u32| blended.get(vertex as usize).is_some_and(|matrix| matrix.determinant() < 0.0);
+    for triangle in mesh.triangles.iter_mut().filter(|triangle| triangle.iter().all(mirrors)) {
+        // Outside stays outside: corners of what is mirrored go round the other way.
+        triangle.swap(1, 2);
+    }
     for (vertex, (matrix, total)) in blended.iter().zip(&total).enumerate().filter(|(_, (_, total))| **total > 0.0) {
         let matrix = *matrix * (1.0 / total);
         mesh.positions[vertex] = matrix.transform_point3(mesh.positions[vertex]);
