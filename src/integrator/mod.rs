@@ -110,8 +110,10 @@ impl TraceSettings {
 
     /// A sample's radiance, or as much of it as [`Self::clamp`] allows.
     pub(crate) fn clamped(&self, radiance: Vec3) -> Vec3 {
-        let kept = self.clamp.map_or(1.0, |clamp| (clamp / radiance.max_element().max(clamp)).min(1.0));
-        radiance * kept
+        let Some(clamp) = self.clamp.filter(|_| !radiance.is_nan()) else { return radiance };
+        // What is infinite has no ratios of channels: as bright as may be.
+        let finite = radiance.min(Vec3::splat(f32::MAX));
+        finite * (clamp / finite.max_element().max(clamp)).min(1.0)
     }
 }
 
@@ -363,6 +365,17 @@ fn samples_per_chunk(batch: &[BlockWork], chunks: usize) -> u64 {
 mod tests {
     use super::*;
     use crate::sampler::Half;
+
+    /// A sample without end is as bright as the clamp lets it be; it was none at all, and the mean one of fewer samples.
+    #[test]
+    fn clamps_hold_what_is_infinite() {
+        let settings = TraceSettings { clamp: Some(8.0), ..TraceSettings::new(1, 1, 0) };
+        let close = |found: Vec3, expected: Vec3| assert!((found - expected).length() < 1e-5, "{found}");
+        close(settings.clamped(Vec3::new(16.0, 4.0, 0.0)), Vec3::new(8.0, 2.0, 0.0));
+        close(settings.clamped(Vec3::new(f32::INFINITY, 4.0, 0.0)), Vec3::new(8.0, 0.0, 0.0));
+        close(settings.clamped(Vec3::splat(7.0)), Vec3::splat(7.0));
+        assert!(settings.clamped(Vec3::new(f32::NAN, 1.0, 1.0)).is_nan());
+    }
 
     /// Threads idle for half a chunk at the end of each batch.
     #[test]
