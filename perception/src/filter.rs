@@ -4,6 +4,7 @@
 //! firefly of 1e20 back out would leave its rounding error all along the row.
 
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 
 use crate::plane::Plane;
 
@@ -76,6 +77,27 @@ fn blurred_by<Window: Fn(&mut Strip) + Sync>(
         }
     };
     along_both_axes(plane, |len| blurred(sigma_y_px, len), |len| blurred(sigma_x_px, len))
+}
+
+/// What the squared weights sum to by which [`gaussian_blur`] makes each pixel of a row: one over the number of pixels that count.
+///
+/// Σ_j k(x, j)² is the mirrored window of σ√2 at the pixel itself, as a sum over the pixel's mirror images.
+pub(crate) fn squared_weights(sigma_px: f64, len: usize) -> Vec<f32> {
+    let (len_px, sigma_px) = (len as f64, sigma_px.min(2.0 * len as f64));
+    // Two such windows, one after the other.
+    let variance = 2.0 * sigma_px * sigma_px;
+    let height = (TAU * variance).sqrt().recip();
+    let images = (6.0 * variance.sqrt() / (2.0 * len_px)).ceil() as i32 + 1;
+    let at = |index: usize| {
+        let from_images = (-images..=images).flat_map(|image| {
+            let away = 2.0 * len_px * f64::from(image);
+            [away, away + 2.0 * index as f64 + 1.0]
+        });
+        let sum: f64 = from_images.map(|distance| (-distance * distance / (2.0 * variance)).exp()).sum();
+        // A window narrower than a pixel is the pixel.
+        (height * sum).min(1.0) as f32
+    };
+    (0..len).map(at).collect()
 }
 
 /// The smallest value of `plane` within a square of half-width `radius_px` around each pixel.
@@ -368,6 +390,23 @@ mod tests {
         let indices: Vec<usize> = (-4..7).map(|index| reflect(index, 3)).collect();
         assert_eq!(indices, [2, 2, 1, 0, 0, 1, 2, 2, 1, 0, 0]);
         assert_eq!(reflect(-1000, 1), 0);
+    }
+
+    /// At borders, where the mirrored window covers a pixel twice, and where it is wider than the row.
+    #[test]
+    fn squared_weights_are_those_of_the_blur() {
+        for (sigma_px, len) in [(3.0, 40), (9.0, 40), (30.0, 40), (2.0, 1)] {
+            let window = |from: usize| {
+                let spike = Plane::from_fn(len, 1, |x, _| if x == from { 1.0 } else { 0.0 });
+                gaussian_blur_xy(&spike, [sigma_px, 0.0])
+            };
+            let windows: Vec<Plane> = (0..len).map(window).collect();
+            for (x, sum) in squared_weights(sigma_px, len).into_iter().enumerate() {
+                let of_windows: f32 = windows.iter().map(|window| window.get(x, 0).powi(2)).sum();
+                // Three boxes are no Gaussian: 2 % of its squares.
+                assert!((sum / of_windows - 1.0).abs() < 0.03, "σ {sigma_px}, {x} of {len}: {sum} for {of_windows}");
+            }
+        }
     }
 
     #[test]

@@ -5,10 +5,11 @@
 //! grating at its threshold has v = 1: the √2 turns its RMS into its amplitude.
 
 use crate::error_filters::{ErrorFilters, LARGEST_RELATIVE_ERROR};
-use crate::filter::gaussian_blur_xy;
+use crate::filter::{gaussian_blur_xy, squared_weights};
 use crate::plane::Plane;
 use crate::sensitivity::luminance_coordinate;
 use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
+use std::f64::consts::SQRT_2;
 
 /// The square of [`LARGEST_RELATIVE_ERROR`].
 const LARGEST_RELATIVE_VARIANCE: f32 = LARGEST_RELATIVE_ERROR * LARGEST_RELATIVE_ERROR;
@@ -119,6 +120,17 @@ impl ThresholdMap {
         self.blurred(plane, POOLING_SIGMA_DEG)
     }
 
+    /// Standard error of [`Self::pooled`] of a plane whose pixels are independent and have this variance (the square of their unit), where
+    /// that changes little over the window: the window's weights squared, which are a window 1/√2 as wide.
+    #[must_use]
+    pub fn pooled_standard_error(&self, variance: &Plane) -> Plane {
+        let sigma_px = self.viewing.display.pixel_density().pixels(POOLING_SIGMA_DEG);
+        let spread = gaussian_blur_xy(variance, sigma_px.map(|sigma_px| sigma_px / SQRT_2));
+        let [columns, rows] = [(sigma_px[0], self.width()), (sigma_px[1], self.height())]
+            .map(|(sigma_px, len)| squared_weights(sigma_px, len));
+        Plane::from_fn(self.width(), self.height(), |x, y| (columns[x] * rows[y] * spread.get(x, y)).sqrt())
+    }
+
     pub(crate) fn blurred(&self, plane: &Plane, sigma_deg: f64) -> Plane {
         gaussian_blur_xy(plane, self.viewing.display.pixel_density().pixels(sigma_deg))
     }
@@ -178,6 +190,23 @@ mod tests {
                 Plane::from_fn(256, 256, |x, _| (std::f64::consts::TAU * freq * (x as f64 + 0.5) / 32.0).cos() as f32);
             f64::from(map.measured_visibility(&grating).get(128, 128))
         });
+    }
+
+    /// In the middle, at a border and in a corner, over 400 planes: a standard deviation of so many is known to 3.5 %.
+    #[test]
+    fn pooled_noise_scatters_as_told() {
+        const PLANES: u64 = 400;
+        let (width, height) = (64, 48);
+        let map = map_of(&Plane::filled(width, height, 100.0), 20.0);
+        let told = map.pooled_standard_error(&Plane::filled(width, height, 4.0));
+        let pooled: Vec<Plane> =
+            (0..PLANES).map(|seed| map.pooled(&noise(width, height, |_, _| 2.0, 7 + seed))).collect();
+        for (x, y) in [(32, 24), (32, 0), (0, 24), (63, 47)] {
+            let found =
+                (pooled.iter().map(|plane| f64::from(plane.get(x, y)).powi(2)).sum::<f64>() / PLANES as f64).sqrt();
+            let told = f64::from(told.get(x, y));
+            assert!((found / told - 1.0).abs() < 4.0 * 0.035, "({x}, {y}): {found} for {told}");
+        }
     }
 
     /// The transform is periodic: what stands at one border must not be seen at the other, 7° away.

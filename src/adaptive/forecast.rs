@@ -32,13 +32,13 @@ impl<'a> Forecast<'a> {
         Self { film, judgement, smear }
     }
 
-    /// Factor on the visibility that the allocation may leave at each pixel: importance, and what the bands' smear makes of the
+    /// Factor on the visibility that the allocation may leave at each pixel: that of thresholds, and what the bands' smear makes of the
     /// noise around it, which the allocation's constraints leave out. A dark strip beside bright noise sees more of it than the
     /// strip's own.
     pub(super) fn tolerance(&self) -> Plane {
-        match &self.judgement.importance {
+        match &self.judgement.threshold_factor {
             None => self.smear.clone(),
-            Some(map) => self.smear.combined(map, |smear, importance| smear * importance),
+            Some(map) => self.smear.combined(map, |smear, factor| smear * factor),
         }
     }
 
@@ -103,7 +103,7 @@ mod tests {
         let (amid, beside) = (column(12), column(60));
         assert!((amid - 1.0).abs() < 0.01, "amid noise {amid}");
         assert!((0.9..0.98).contains(&beside), "beside it {beside}");
-        judgement.importance = Some(Plane::filled(64, 64, 0.5));
+        judgement.threshold_factor = Some(Plane::filled(64, 64, 0.5));
         judgement.predicted = judgement.predicted.map(|visibility| visibility / 0.5);
         let of_half = Forecast::of(&film, &judgement).tolerance();
         assert!((of_half.get(12, 30) / tolerance.get(12, 30) - 0.5).abs() < 1e-6);

@@ -41,9 +41,9 @@ pub struct Judgement {
     pub tone: Box<dyn FittedTone>,
     /// What can be seen where.
     pub thresholds: Thresholds,
-    /// What [`LoopSettings::importance`] multiplies thresholds by. `thresholds` are without it; what a judgement's methods say, and
-    /// `predicted`, is with it.
-    pub importance: Option<Plane>,
+    /// What thresholds are multiplied by: [`LoopSettings::importance`], over what makes an upper bound of the estimate where one is asked for.
+    /// `thresholds` are without it; what a judgement's methods say, and `predicted`, is with it.
+    pub threshold_factor: Option<Plane>,
     /// Whether the film has samples enough to tell what can be seen: [`Film::has_both_halves`].
     pub is_known: bool,
     /// Visibility that the variance predicts; infinite everywhere where it is not known.
@@ -198,7 +198,7 @@ impl Look<'_> {
             seconds_denoising,
             tone,
             thresholds,
-            importance: settings.importance.clone(),
+            threshold_factor: settings.importance.clone(),
             is_known: film.has_both_halves(),
             predicted,
             pooled_variance_per_sample: pooled,
@@ -244,7 +244,7 @@ impl Look<'_> {
         };
         // An infinite variance, pooled with others, is NaN.
         let of_error = of_error.map(|v| if v.is_nan() { f32::INFINITY } else { v });
-        per_importance(of_error, self.settings.importance.as_ref())
+        divided(of_error, self.settings.importance.as_ref())
     }
 }
 
@@ -256,9 +256,9 @@ fn worse_of(visibility: Plane, other: Option<&Plane>) -> Plane {
     }
 }
 
-/// A visibility under thresholds that importance multiplies.
-fn per_importance(visibility: Plane, importance: Option<&Plane>) -> Plane {
-    match importance {
+/// A visibility under thresholds that are multiplied.
+fn divided(visibility: Plane, threshold_factor: Option<&Plane>) -> Plane {
+    match threshold_factor {
         None => visibility,
         Some(map) => visibility.combined(map, |visibility, factor| visibility / factor),
     }
@@ -276,10 +276,10 @@ impl Judgement {
         self.denoised.as_ref().map_or(&self.estimate.rgb_cd_m2, |denoised| &denoised.rgb_cd_m2)
     }
 
-    /// What can be seen of the denoised picture's error, by importance as `predicted` is. `None` for raw pictures.
+    /// What can be seen of the denoised picture's error, under the thresholds of `predicted`. `None` for raw pictures.
     pub fn denoised_error(&self) -> Option<Cow<'_, DenoisedError>> {
         let error = &self.denoised.as_ref()?.error;
-        Some(match &self.importance {
+        Some(match &self.threshold_factor {
             None => Cow::Borrowed(error),
             Some(map) => Cow::Owned(error.with_thresholds_times(map)),
         })
@@ -287,7 +287,7 @@ impl Judgement {
 
     /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)².
     pub fn visibility_of(&self, display_variance: &Plane) -> Plane {
-        self.per_importance(self.thresholds.visibility(display_variance))
+        self.under_thresholds(self.thresholds.visibility(display_variance))
     }
 
     /// The same with each pixel's noise judged where it is, before the bands smear it: what the allocation's constraints say. One
@@ -311,36 +311,51 @@ impl Judgement {
     /// Standard error of a pixel, cd/m² on the display, that is at visibility 1 by the model that drives the loop.
     pub fn allowed_standard_error_cd_m2(&self) -> Plane {
         let allowed = self.thresholds.limits();
-        match &self.importance {
+        match &self.threshold_factor {
             None => allowed,
             Some(map) => allowed.combined(map, |allowed, factor| allowed * factor),
         }
     }
 
-    fn per_importance(&self, visibility: Plane) -> Plane {
-        per_importance(visibility, self.importance.as_ref())
+    fn under_thresholds(&self, visibility: Plane) -> Plane {
+        divided(visibility, self.threshold_factor.as_ref())
+    }
+
+    /// Everything visible is so many times as visible, at least 1, from here on: thresholds are divided by it.
+    pub(super) fn raise(&mut self, factor: &Plane) {
+        self.predicted = self.predicted.combined(factor, |visibility, factor| visibility * factor);
+        self.threshold_factor = Some(match &self.threshold_factor {
+            None => factor.map(f32::recip),
+            Some(map) => map.combined(factor, |threshold, factor| threshold / factor),
+        });
+        self.measured = OnceLock::new();
+    }
+
+    /// Half of what the halves differ by on the display, cd/m²; the denoised halves where the picture is denoised.
+    pub(super) fn displayed_half_difference(&self) -> Plane {
+        let raw = || {
+            seen::display_half_difference(
+                self.tone.as_ref(),
+                &self.thresholds.in_bands.viewing().display,
+                &self.estimate.luminance_cd_m2,
+                &self.estimate.half_difference,
+            )
+        };
+        self.denoised.as_ref().map_or_else(raw, |denoised| denoised.half_difference.clone())
     }
 
     /// What can be seen of the halves' luminance difference: the same as predicted, measured; of the denoised halves where the
     /// picture is denoised.
     pub fn measured_error(&self) -> &MeasuredError {
         self.measured.get_or_init(|| {
-            let raw = || {
-                seen::display_half_difference(
-                    self.tone.as_ref(),
-                    &self.thresholds.in_bands.viewing().display,
-                    &self.estimate.luminance_cd_m2,
-                    &self.estimate.half_difference,
-                )
-            };
-            let displayed = self.denoised.as_ref().map_or_else(raw, |denoised| denoised.half_difference.clone());
+            let displayed = self.displayed_half_difference();
             let MeasuredError { visibility, amplitude } = match &self.over_white {
                 Some(over_white) => {
                     over_white.worse_error(self.thresholds.in_bands.measured_error(&displayed), &displayed)
                 }
                 None => self.thresholds.in_bands.measured_error(&displayed),
             };
-            MeasuredError { visibility: self.per_importance(visibility), amplitude: self.per_importance(amplitude) }
+            MeasuredError { visibility: self.under_thresholds(visibility), amplitude: self.under_thresholds(amplitude) }
         })
     }
 }

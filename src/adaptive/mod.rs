@@ -7,6 +7,7 @@
 
 pub mod audit;
 mod awake;
+mod confidence;
 pub mod denoised;
 mod forecast;
 mod gain;
@@ -37,6 +38,7 @@ use crate::film::Film;
 use crate::integrator::{BlockWork, Crop, PathTracer, SamplePlan};
 use audit::Audit;
 use awake::with_threads_awake;
+use confidence::{factor_of_bound, standard_errors};
 use judge::{JudgeError, Judgement, judge, judge_to_plan};
 use plan::slices;
 use progress::progress;
@@ -136,6 +138,26 @@ struct Loop<'a> {
 /// [`judge()`] or [`judge_to_plan`].
 type Judge = fn(&Film, &LoopSettings, f64) -> Result<Judgement, JudgeError>;
 
+/// Looks at a render as it is, with what audits and earlier looks make of that.
+fn look_at(state: &RenderState, settings: &LoopSettings, judge: Judge) -> Result<Judgement, JudgeError> {
+    let mut judgement = judge(&state.film, settings, state.inflation)?;
+    if let Some(confidence) = settings.limits.confidence {
+        let standard_errors = standard_errors(confidence, state.looks);
+        if let Some(factor) = factor_of_bound(&judgement, state, standard_errors) {
+            judgement.raise(&factor);
+        }
+    }
+    Ok(judgement)
+}
+
+/// What is seen of a render that rests, as its next look would see it.
+///
+/// # Errors
+/// As [`judge()`].
+pub fn look_at_rest(state: &RenderState, settings: &LoopSettings) -> Result<Judgement, JudgeError> {
+    look_at(state, settings, judge)
+}
+
 /// The last look of this run.
 #[derive(Clone, Copy, Debug)]
 struct LookTaken {
@@ -167,7 +189,7 @@ pub fn resume(
     let LastLook { judgement, stop_reason } = match last_look {
         Some(last_look) => last_look,
         None => {
-            let judgement = judge(&state.film, settings, state.inflation).inspect_err(|_| monitor.failed(&state))?;
+            let judgement = look_at(&state, settings, judge).inspect_err(|_| monitor.failed(&state))?;
             let Judgement { seconds, seconds_denoising: denoising, .. } = judgement;
             state.seconds += Seconds { total: seconds, perception: seconds, allocation: 0.0, denoising };
             LastLook { judgement, stop_reason: StopReason::Interrupted }
@@ -282,12 +304,12 @@ impl<'a> Loop<'a> {
     /// Tells what was seen and enters the plan that came of it, or says why there is none.
     fn take(&mut self, step: Step, judgement: &Judgement, look: Instant, monitor: &dyn Monitor) -> Option<StopReason> {
         self.state.seconds.perception += look.elapsed().as_secs_f64();
-        self.state.looks += 1;
         monitor.looked(&progress(self, judgement, &step));
         monitor.judged(&self.state, judgement);
         match step {
             Step::Trace(plan) => {
                 self.enter(plan);
+                self.state.looks += 1;
                 self.state.tone = Some(judgement.tone.save());
                 None
             }
@@ -307,7 +329,7 @@ impl<'a> Loop<'a> {
     /// Looks at the film, to plan more of it or at the end.
     fn look(&mut self, judge: Judge) -> Result<Judgement, JudgeError> {
         let started = Instant::now();
-        let judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
+        let judgement = look_at(&self.state, self.settings, judge)?;
         self.state.seconds.denoising += judgement.seconds_denoising;
         let at_samples = self.state.film.total_samples();
         self.looked = Some(LookTaken { at_samples, seconds: started.elapsed().as_secs_f64() });

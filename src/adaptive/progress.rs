@@ -18,7 +18,7 @@ pub(super) fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) ->
         Step::Stop(_) => (0, 0.0),
     };
     Progress {
-        look: state.looks,
+        look: state.looks.saturating_add(1),
         seconds: render.seconds(),
         rung: rungs.front().copied().unwrap_or(limits.last_rung()),
         pixels,

@@ -71,6 +71,9 @@ pub enum AllocationRule {
 pub struct Limits {
     /// Visibility that may remain; 1 is at threshold. `None`: only the other limits count.
     pub visibility: Option<f64>,
+    /// Probability, from 0.5 to 1, with which a place of a raw picture is no more visible than told, over all looks of the default threshold
+    /// model. `None`: estimates are told and gone by as they are.
+    pub confidence: Option<f64>,
     /// Time since the start; checked between plans.
     pub time: Option<Duration>,
     /// Mean samples a pixel.
@@ -112,6 +115,7 @@ impl Limits {
     pub fn of_visibility(visibility: f64) -> Self {
         Self {
             visibility: Some(visibility),
+            confidence: None,
             time: None,
             mean_samples: None,
             max_samples: DEFAULT_MAX_SAMPLES,

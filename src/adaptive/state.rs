@@ -37,7 +37,7 @@ pub struct RenderState {
     pub until_look: Option<UntilLook>,
     /// Plans traced.
     pub plans: u32,
-    /// Looks taken.
+    /// Looks of which a plan came.
     pub looks: u32,
     /// What it took so far.
     pub seconds: Seconds,

@@ -41,6 +41,8 @@ pub enum Arm {
     Default,
     /// The loop asked for v\* and not tuned: what it promises (99.9 % of the picture) against what it delivers.
     AsAsked,
+    /// The same, whose stop is an upper bound of 95 % confidence over all looks.
+    Confident,
     /// The loop on its way to threshold, ended at the samples that it took as asked: what `--spp` and `--time` leave.
     ToThreshold,
     /// Converged variance, thresholds of the reference, convex optimum for 99 % of the picture; its target searched.
@@ -49,7 +51,7 @@ pub enum Arm {
 
 impl Arm {
     /// Every arm.
-    pub const ALL: [Arm; 17] = [
+    pub const ALL: [Arm; 18] = [
         Arm::Uniform,
         Arm::Relative,
         Arm::Variance,
@@ -64,6 +66,7 @@ impl Arm {
         Arm::LocalRule,
         Arm::Default,
         Arm::AsAsked,
+        Arm::Confident,
         Arm::UniformEqualTime,
         Arm::ToThreshold,
         Arm::Oracle,
@@ -90,6 +93,7 @@ impl Arm {
             Arm::LocalRule => "local-rule",
             Arm::Default => "default",
             Arm::AsAsked => "as-asked",
+            Arm::Confident => "confident",
             Arm::ToThreshold => "to-threshold",
             Arm::Oracle => "oracle",
         }
@@ -107,7 +111,7 @@ impl Arm {
             // A mean count n, as 1/√n.
             Arm::Uniform => Some(uniform_spp.max(4.0).log2().round().exp2().sqrt().recip()),
             Arm::Budget => Some((0.5 * uniform_spp).sqrt().recip()),
-            Arm::AsAsked | Arm::UniformEqualTime | Arm::ToThreshold => None,
+            Arm::AsAsked | Arm::Confident | Arm::UniformEqualTime | Arm::ToThreshold => None,
             _ => Some(subject.visibility),
         }
     }
@@ -151,6 +155,7 @@ impl Arm {
                 settings.limits.visibility = Some(THRESHOLD);
                 settings.limits.mean_samples = Some(samples_of(knob));
             }
+            Arm::Confident => settings.limits.confidence = Some(0.95),
             Arm::AsAsked | Arm::Oracle => {}
         }
         if matches!(settings.sampling, Sampling::Rival(RivalRule::Relative { .. } | RivalRule::Variance { .. })) {

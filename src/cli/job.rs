@@ -12,7 +12,8 @@ use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
 use super::numbers::{
-    parse_finite, parse_positive, parse_radiance, parse_seconds, parse_seed, parse_stops, parse_unit, whole,
+    parse_confidence, parse_finite, parse_positive, parse_radiance, parse_seconds, parse_seed, parse_stops, parse_unit,
+    whole,
 };
 use super::seeing::{display_help, model_values, operator_values};
 use super::targets::{Named, display_file};
@@ -59,6 +60,10 @@ pub(super) struct JobArguments {
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
+    /// Stop where the picture is no more visible than that with this confidence, in per cent, however often it was looked at. Visibilities
+    /// are told as such upper bounds [default: they are estimates].
+    #[arg(long, value_name = "PERCENT", value_parser = parse_confidence, allow_negative_numbers = true, help_heading = "Until")]
+    confidence: Option<f64>,
     /// Stop after this many seconds of rendering, between plans; the first of them, 16 samples a pixel (4 of a denoised
     /// picture), is always traced.
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, help_heading = "Until")]

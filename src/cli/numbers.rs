@@ -34,6 +34,13 @@ pub(super) fn parse_positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A probability in per cent that is more than chance and less than certainty.
+pub(super) fn parse_confidence(text: &str) -> Result<f64, String> {
+    let (least, most) = (50.0, 99.99);
+    let number = text.parse().ok().filter(|value| (least..=most).contains(value));
+    number.ok_or_else(|| format!("\"{text}\" is not a confidence from {least} to {most} per cent"))
+}
+
 /// The most that a sample may have in scene units: above 0 as the tracer has it, in f32.
 pub(super) fn parse_radiance(text: &str) -> Result<f32, String> {
     let least = f32::from_bits(1);

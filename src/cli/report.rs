@@ -121,6 +121,9 @@ pub(super) struct Report {
     /// What made the picture out of the mean, and what can be seen of what it left and of what it changed.
     denoised: Option<DenoisedReport>,
     visibility_target: Option<f64>,
+    /// Probability with which visibilities and chances here are no less than the truth, at this look and all before; none where they are
+    /// estimates.
+    confidence: Option<f64>,
     /// None here and in the figures that follow from it where the samples are too few to tell, as in a render of one a pixel.
     visibility_p99: Option<f64>,
     visibility_p999: Option<f64>,
@@ -195,6 +198,7 @@ impl Report {
             seconds_denoising: rendered.seconds.denoising,
             denoised: DenoisedReport::of(settings, judgement),
             visibility_target: target,
+            confidence: settings.limits.confidence,
             visibility_p99: quantile(0.99),
             visibility_p999: quantile(0.999),
             visibility_max: quantile(1.0),
@@ -257,6 +261,9 @@ impl Report {
         ];
         if let Some(target) = self.visibility_target {
             attributes.push(("fechner.visibility_target", number(target)));
+        }
+        if let Some(confidence) = self.confidence {
+            attributes.push(("fechner.confidence", number(confidence)));
         }
         if let Some(denoised) = &self.denoised {
             attributes.push(("fechner.denoiser", text(&denoised.denoiser)));

@@ -35,6 +35,7 @@ pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: F
         sampling,
         limits: Limits {
             visibility: visibility_limit(asked, scene, sampling, has_other_limit),
+            confidence: None,
             time: None,
             mean_samples: arguments.spp,
             max_samples: arguments.max_spp,

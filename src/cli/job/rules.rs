@@ -55,6 +55,7 @@ pub(super) fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
     Limits {
         visibility: visibility_limit(asked, scene, sampling, arguments.has_other_limit()),
+        confidence: arguments.confidence.map(|per_cent| per_cent / 100.0),
         time: arguments.time,
         mean_samples: arguments.spp,
         max_samples: arguments.max_spp,
@@ -97,6 +98,25 @@ pub(super) fn check_rule(arguments: &JobArguments) -> anyhow::Result<()> {
     if (arguments.visibility.is_some() || arguments.quality.is_some()) && !stops_by_sight {
         bail!(
             "--visibility and --quality are looked at by --sampling adaptive and uniform, not by this one: leave them out"
+        );
+    }
+    check_confidence(arguments, stops_by_sight)
+}
+
+/// Refuses a bound on what has none: it is of noise that the eye's window pools.
+fn check_confidence(arguments: &JobArguments, stops_by_sight: bool) -> anyhow::Result<()> {
+    if arguments.confidence.is_none() {
+        return Ok(());
+    }
+    if !stops_by_sight {
+        bail!("--confidence is about what is seen, which this --sampling does not ask: use adaptive or uniform");
+    }
+    if arguments.model != model::DEFAULT {
+        bail!("--confidence is for --model {}: {} pools no pixels", model::DEFAULT, arguments.model);
+    }
+    if arguments.denoise.kind().is_some() {
+        bail!(
+            "--confidence is for raw pictures: what a denoiser changes has no scatter that halves would show; leave out one of the two"
         );
     }
     Ok(())

@@ -28,6 +28,7 @@ pub(in crate::cli) fn summary(
 ) -> String {
     let mut lines = vec![spent(report), stopped(report, settings, rendered, interrupter)];
     lines.extend(noticed(report, &settings.viewing.display, &rendered.judgement.predicted));
+    lines.extend(confidence(report));
     lines.extend(importance(report));
     lines.extend(denoised(report));
     lines.extend(audited(report, rendered));
@@ -100,6 +101,15 @@ fn noticed(report: &Report, display: &Display, predicted: &Plane) -> Option<Stri
         100.0 * detection_probability(p99),
         patch_count(predicted, display),
     ))
+}
+
+fn confidence(report: &Report) -> Option<String> {
+    report.confidence.map(|confidence| {
+        format!(
+            "Visibilities and chances are upper bounds: each place is below them with {} % confidence, over all looks.",
+            rounded(100.0 * confidence)
+        )
+    })
 }
 
 fn importance(report: &Report) -> Option<String> {

@@ -8,8 +8,8 @@ use super::live::Changed;
 use super::problems::Cause;
 use super::rest_look::{RestLook, Unlooked};
 use super::waiting::is_whole;
-use crate::adaptive::judge::{JudgeError, Judgement, judge};
-use crate::adaptive::{LastLook, StopReason, is_reached};
+use crate::adaptive::judge::{JudgeError, Judgement};
+use crate::adaptive::{LastLook, StopReason, is_reached, look_at_rest};
 use crate::preview::command::Phase;
 use crate::preview::screen::Looked;
 use std::sync::Arc;
@@ -62,7 +62,7 @@ impl Session<'_> {
     pub(super) fn look_at_rest(&mut self) {
         let shared = Arc::clone(self.shared);
         let is_outdated = self.settings.is_outdated.replace(Box::new(move || shared.has_news()));
-        let found = judge(&self.state.film, &self.settings, self.state.inflation);
+        let found = look_at_rest(&self.state, &self.settings);
         self.settings.is_outdated = is_outdated;
         match found {
             Ok(judgement) => self.looked_at_rest(judgement),
@@ -104,7 +104,7 @@ impl Session<'_> {
 
     /// Looks at the film as it is.
     pub(super) fn look(&mut self) -> Option<Judgement> {
-        match judge(&self.state.film, &self.settings, self.state.inflation) {
+        match look_at_rest(&self.state, &self.settings) {
             Ok(judgement) => {
                 self.problems.solve(Cause::Look);
                 Some(judgement)

@@ -1,0 +1,178 @@
+//! An upper bound on what can be seen, which holds however often one looks.
+//!
+//! A look's estimate is below the truth about as often as above it, and the more often one looks the likelier one look finds it low. So
+//! the k-th look of which a plan may come adds as many standard errors of the estimate as a normal variable stays below with probability
+//! 1 − α/(k(k+1)). These chances sum to α: a place is wrongly called invisible at any look with a chance of α at most (a union bound over
+//! looks, as in A. Wald's and H. Robbins's sequential tests).
+//!
+//! v² is a mean over the eye's window, and each pixel of it has an observation of its own: the squared difference of its halves. Their mean
+//! has no bias, where that of pooled variances, which are held to what halves may differ by, is some 3 % low. By how much they miss what was
+//! told of them is the scatter of that mean, heavy tails among it; and so many pixels are in a window that it is nearly normal.
+//!
+//! Not for models that pool nothing, nor for what a denoiser changed. Paths that were never sampled are in no bound.
+
+use super::judge::{Judgement, variance_shares};
+use super::state::RenderState;
+use fechner_perception::Plane;
+
+/// Standard errors that a look adds to stay on the safe side with probability `confidence` over all looks, `earlier_looks` before it.
+pub(super) fn standard_errors(confidence: f64, earlier_looks: u32) -> f64 {
+    let look = f64::from(earlier_looks) + 1.0;
+    upper_quantile((1.0 - confidence) / (look * (look + 1.0)))
+}
+
+/// What a standard normal variable exceeds with so small a probability.
+fn upper_quantile(probability: f64) -> f64 {
+    /// Exceeded with a probability of 1e-300.
+    const BEYOND: f64 = 38.0;
+    let (mut least, mut most) = (0.0, BEYOND);
+    for _ in 0..60 {
+        let middle = 0.5 * (least + most);
+        let exceeded = 0.5 * libm::erfc(middle / std::f64::consts::SQRT_2);
+        *(if exceeded > probability { &mut least } else { &mut most }) = middle;
+    }
+    0.5 * (least + most)
+}
+
+/// How many times the predicted visibility the bound is, at least 1: the root of what the halves' difference says of v², or else was predicted,
+/// and so many of its standard errors over what was predicted. `None` where no window pools.
+pub(super) fn factor_of_bound(judgement: &Judgement, state: &RenderState, standard_errors: f64) -> Option<Plane> {
+    if judgement.thresholds.per_pixel.is_some() || judgement.denoised.is_some() {
+        return None;
+    }
+    let shares = variance_shares(&state.film);
+    let told = judgement.pooled_variance_per_sample.combined(&shares, |per_sample, share| per_sample * share);
+    let found = judgement.displayed_half_difference().map(|difference| difference * difference);
+    let [told, found] = judgement.energies_of([&told, &found]);
+    let missed = found.combined(&told, |found, told| {
+        let missed = (found - told).abs();
+        if missed.is_finite() { missed } else { 0.0 }
+    });
+    // Squares of f32 end at 1e38.
+    let unit = missed.values().iter().fold(f32::MIN_POSITIVE, |most, &missed| most.max(missed));
+    let thresholds = &judgement.thresholds.in_bands;
+    let standard_error = thresholds.pooled_standard_error(&missed.map(|missed| (missed / unit) * (missed / unit)));
+    let [told, found] = [told, found].map(|energy| thresholds.pooled(&energy));
+    let bound = found.combined(&standard_error, |found, error| found + standard_errors as f32 * error * unit);
+    Some(bound.combined(&told, |bound, told| {
+        let times = (bound / told).sqrt();
+        if times.is_finite() { times.max(1.0) } else { 1.0 }
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::judge::judge;
+    use super::super::test_films::settings;
+    use super::*;
+    use crate::film::{Film, film_of_samples};
+    use crate::integrator::PathSample;
+    use crate::sampler::{hash_words, unit_f64_of_hash};
+    use glam::Vec3;
+
+    const SIDE: u32 = 64;
+    const CONFIDENCE: f64 = 0.95;
+
+    /// What samples of a pixel are drawn from: a share of display white, and its variance.
+    struct Noise {
+        name: &'static str,
+        /// Of two numbers in [0, 1).
+        draw: fn(f64, f64) -> f64,
+        variance: f64,
+    }
+
+    /// A standard normal variable of two in [0, 1).
+    fn normal(u: f64, v: f64) -> f64 {
+        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    }
+
+    /// Even noise, a lognormal of coefficient of variation 2, and fireflies of a tenth of the light that one sample in 200 finds.
+    const NOISES: [Noise; 3] = [
+        Noise { name: "even", draw: |u, _| 0.2 + 0.2 * u, variance: 0.04 / 12.0 },
+        // exp(σ²) = 5.
+        Noise { name: "lognormal", draw: |u, v| 0.02 * (1.268_636 * normal(u, v) - 0.804_719).exp(), variance: 0.0016 },
+        Noise {
+            name: "fireflies",
+            draw: |u, _| if u < 0.005 { 0.8 } else { 0.036 },
+            variance: 0.005 * 0.995 * 0.764 * 0.764,
+        },
+    ];
+
+    fn film_of(noise: &Noise, seed: u64, samples_a_half: u32) -> Film {
+        film_of_samples([SIDE; 2], [samples_a_half; 2], |pixel, half, index| {
+            let key = hash_words(seed, u64::from(pixel) << 32 | u64::from(index) << 1 | half.index() as u64);
+            let [u, v] = [1, 2].map(|which| unit_f64_of_hash(hash_words(key, which)));
+            PathSample::of_wall(Vec3::splat((noise.draw)(u, v) as f32))
+        })
+    }
+
+    /// Shares of places of which an estimate, or a bound, was below the truth at any of some looks at a render.
+    fn shares_below_the_truth(noise: &Noise, looks: &[u32], seed: u64) -> [f64; 2] {
+        let settings = settings();
+        let places = (SIDE * SIDE) as usize;
+        let mut is_below = vec![[false; 2]; places];
+        for (earlier, &samples_a_half) in looks.iter().enumerate() {
+            let film = film_of(noise, seed, samples_a_half);
+            let judgement = judge(&film, &settings, 1.0).expect("judges");
+            let nits = settings.nits_per_unit;
+            let variance = noise.variance * nits * nits / f64::from(2 * samples_a_half);
+            let truth = judgement.visibility_of(&Plane::filled(SIDE as usize, SIDE as usize, variance as f32));
+            let state = RenderState::of_film(film, 16);
+            let factor = factor_of_bound(&judgement, &state, standard_errors(CONFIDENCE, earlier as u32));
+            let factor = factor.expect("a window pools");
+            for (place, is_below) in is_below.iter_mut().enumerate() {
+                let [predicted, factor, truth] = [&judgement.predicted, &factor, &truth].map(|p| p.values()[place]);
+                is_below[0] |= predicted < truth;
+                is_below[1] |= predicted * factor < truth;
+            }
+        }
+        [0, 1].map(|which| is_below.iter().filter(|below| below[which]).count() as f64 / places as f64)
+    }
+
+    /// The mean of some shares and its standard error.
+    fn mean_of(shares: impl ExactSizeIterator<Item = f64> + Clone) -> [f64; 2] {
+        let count = shares.len() as f64;
+        let mean = shares.clone().sum::<f64>() / count;
+        let variance = shares.map(|share| (share - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        [mean, (variance / count).sqrt()]
+    }
+
+    /// Of so many renders, by noise: the shares of estimates and of bounds, each with its standard error.
+    fn table(seeds: u64, looks: &[u32]) -> Vec<[[f64; 2]; 2]> {
+        let of_noise = |noise: &Noise| {
+            let shares: Vec<_> = (0..seeds).map(|seed| shares_below_the_truth(noise, looks, seed)).collect();
+            let found = [0, 1].map(|which| mean_of(shares.iter().map(|share| share[which])));
+            let [estimates, bounds] =
+                found.map(|[mean, error]| format!("{:.2} ± {:.2} %", 100.0 * mean, 100.0 * error));
+            println!("{}, {looks:?} samples a half: estimates {estimates}, bounds {bounds}", noise.name);
+            found
+        };
+        NOISES.iter().map(of_noise).collect()
+    }
+
+    #[test]
+    fn chances_of_all_looks_sum_to_what_is_left_of_confidence() {
+        for (earlier, expected) in [(0, 1.959_964), (1, 2.393_98), (9, 3.317_25)] {
+            let found = standard_errors(CONFIDENCE, earlier);
+            assert!((found - expected).abs() < 1e-4, "{found} for {expected}");
+        }
+    }
+
+    /// Within three standard errors of 40 renders.
+    #[test]
+    fn bounds_hold_over_looks_where_estimates_do_not() {
+        for [[estimates, _], [bounds, error]] in table(40, &[8, 16, 32]) {
+            assert!(estimates > 0.5, "{estimates}");
+            assert!(bounds < 1.0 - CONFIDENCE + 3.0 * error, "{bounds} ± {error}");
+        }
+    }
+
+    /// The table of `benches/results/sampling.md`: two minutes.
+    #[test]
+    #[ignore = "minutes"]
+    fn bounds_in_numbers() {
+        for looks in [&[8][..], &[8, 16, 32, 64, 128, 256]] {
+            table(400, looks);
+        }
+    }
+}
