@@ -36,6 +36,7 @@ pub use stela::StelaCsf;
 
 use crate::display::Viewing;
 use crate::error::{Error, check_range};
+use crate::names::{NamedTable, find, names_of};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -116,8 +117,37 @@ pub(crate) fn check_area_deg2(what: &'static str, area_deg2: f64) -> Result<(), 
 /// The name of the function that everything uses unless told otherwise.
 pub const DEFAULT: &str = "castle";
 
-const NAMES: [&str; 9] =
-    [DEFAULT, "stela", "barten99", "barten89", "daly93", "daly98", "laird06", "hdrvdp2", "mannos-sakrison"];
+/// What the table of functions makes.
+type Made = Box<dyn ContrastSensitivity>;
+
+/// How a function is made.
+enum Constructor {
+    /// By itself.
+    Plain(fn() -> Made),
+    /// For gratings of an area, deg², and for the display's distance where it depends on that.
+    OfArea(fn(area_deg2: f64, &Viewing) -> Result<Made, Error>),
+}
+
+/// All functions, in the order in which they are listed.
+const FUNCTIONS: NamedTable<Constructor, 9> = [
+    (DEFAULT, Constructor::OfArea(|area_deg2, _| Ok(Box::new(CastleCsf::new(area_deg2)?)))),
+    ("stela", Constructor::OfArea(|area_deg2, _| Ok(Box::new(StelaCsf { area_deg2 })))),
+    ("barten99", Constructor::OfArea(|area_deg2, _| Ok(Box::new(Barten99 { field_deg: area_deg2.sqrt() })))),
+    ("barten89", Constructor::Plain(|| Box::new(Barten89))),
+    (
+        "daly93",
+        Constructor::OfArea(|area_deg2, viewing| {
+            let distance_m = viewing.display.distance_m.unwrap_or(Daly93::default().distance_m);
+            Ok(Box::new(Daly93 { area_deg2, distance_m, ..Daly93::default() }))
+        }),
+    ),
+    ("daly98", Constructor::Plain(|| Box::new(Daly98::default()))),
+    ("laird06", Constructor::Plain(|| Box::new(Laird06::default()))),
+    ("hdrvdp2", Constructor::Plain(|| Box::new(HdrVdp2::default()))),
+    ("mannos-sakrison", Constructor::Plain(|| Box::new(MannosSakrison::default()))),
+];
+
+const NAMES: [&str; FUNCTIONS.len()] = names_of(&FUNCTIONS);
 
 /// The names that [`by_name`] knows; the first is [`DEFAULT`].
 #[must_use]
@@ -128,7 +158,7 @@ pub fn names() -> &'static [&'static str] {
 /// Whether the function of that name depends on the area of the grating.
 #[must_use]
 pub fn knows_area(name: &str) -> bool {
-    matches!(name, "castle" | "stela" | "barten99" | "daly93")
+    matches!(find(&FUNCTIONS, name), Some(Constructor::OfArea(_)))
 }
 
 /// The function of that name, for the observer's area and the display's distance where it depends on them.
@@ -144,29 +174,11 @@ pub fn knows_area(name: &str) -> bool {
 /// ```
 pub fn by_name(name: &str, viewing: &Viewing) -> Result<Box<dyn ContrastSensitivity>, Error> {
     viewing.check()?;
-    let area_deg2 = viewing.observer.csf_area_deg2;
-    Ok(match name {
-        DEFAULT => Box::new(CastleCsf::new(area_deg2)?),
-        "barten99" => Box::new(Barten99 { field_deg: area_deg2.sqrt() }),
-        "daly93" => Box::new(Daly93 {
-            area_deg2,
-            distance_m: viewing.display.distance_m.unwrap_or(Daly93::default().distance_m),
-            ..Daly93::default()
-        }),
-        "stela" => Box::new(StelaCsf { area_deg2 }),
-        "barten89" => Box::new(Barten89),
-        "daly98" => Box::new(Daly98::default()),
-        "laird06" => Box::new(Laird06::default()),
-        "hdrvdp2" => Box::new(HdrVdp2::default()),
-        "mannos-sakrison" => Box::new(MannosSakrison::default()),
-        _ => {
-            return Err(Error::UnknownName {
-                kind: "contrast sensitivity function",
-                name: name.to_owned(),
-                known: NAMES.join(", "),
-            });
-        }
-    })
+    match find(&FUNCTIONS, name) {
+        Some(Constructor::Plain(make)) => Ok(make()),
+        Some(Constructor::OfArea(make)) => make(viewing.observer.csf_area_deg2, viewing),
+        None => Err(Error::unknown_name("contrast sensitivity function", name, names())),
+    }
 }
 
 /// Greatest sensitivity over 0.05 to 60 cpd at one luminance.
@@ -213,6 +225,19 @@ mod tests {
             }
         }
         assert!(Daly98::default().ln_sensitivity(f64::MAX).is_finite());
+    }
+
+    #[test]
+    fn functions_know_whether_they_ask_the_area() {
+        for name in names() {
+            let of_area = |csf_area_deg2| {
+                let mut viewing = Viewing::default();
+                viewing.observer.csf_area_deg2 = csf_area_deg2;
+                by_name(name, &viewing).unwrap().sensitivity(2.0, 100.0)
+            };
+            assert_eq!(of_area(1.0) != of_area(7.0), knows_area(name), "{name}");
+            assert_eq!(by_name(name, &Viewing::default()).unwrap().name(), *name);
+        }
     }
 
     /// Beyond what is asked for nothing counts, where the greatest sensitivity is at an end: the search went on to 0.0448 and 67 cpd.

@@ -22,6 +22,7 @@ use crate::csf::ContrastSensitivity;
 use crate::display::Viewing;
 use crate::error::Error;
 use crate::filter::gaussian_blur_xy;
+use crate::names::{NamedTable, find, names_of};
 use crate::plane::Plane;
 use crate::table::UniformTable;
 use crate::threshold::{GuideNoise, POOLING_SIGMA_DEG};
@@ -131,7 +132,21 @@ const Z_95: f64 = 1.96;
 /// Name of the model that is meant where none is named, and the only one that knows denoised pictures and where one looks.
 pub const DEFAULT: &str = "csf-bands";
 
-const NAMES: [&str; 7] = [DEFAULT, "ramasubramanian", "yee", "bolin-meyer", "tvi", "csf-unmasked", "tvi-masked"];
+/// Makes a model with its defaults.
+type Constructor = fn() -> Box<dyn ThresholdModel>;
+
+/// All models, in the order in which they are listed.
+const MODELS: NamedTable<Constructor, 7> = [
+    (DEFAULT, || Box::new(CsfBands)),
+    ("ramasubramanian", || Box::new(Ramasubramanian::default())),
+    ("yee", || Box::new(Yee::default())),
+    ("bolin-meyer", || Box::new(BolinMeyer)),
+    ("tvi", || Box::new(Tvi::default())),
+    ("csf-unmasked", || Box::new(Unmasked)),
+    ("tvi-masked", || Box::new(MaskedTvi)),
+];
+
+const NAMES: [&str; MODELS.len()] = names_of(&MODELS);
 
 /// The names that [`by_name`] knows; the first is [`DEFAULT`].
 #[must_use]
@@ -148,16 +163,7 @@ pub fn names() -> &'static [&'static str] {
 /// ```
 #[must_use]
 pub fn by_name(name: &str) -> Option<Box<dyn ThresholdModel>> {
-    Some(match name {
-        DEFAULT => Box::new(CsfBands),
-        "ramasubramanian" => Box::new(Ramasubramanian::default()),
-        "yee" => Box::new(Yee::default()),
-        "bolin-meyer" => Box::new(BolinMeyer),
-        "tvi" => Box::new(Tvi::default()),
-        "csf-unmasked" => Box::new(Unmasked),
-        "tvi-masked" => Box::new(MaskedTvi),
-        _ => return None,
-    })
+    find(&MODELS, name).map(|constructor| constructor())
 }
 
 /// [`by_name`], for names that somebody has given.
