@@ -21,11 +21,9 @@ pub struct Difference {
 
 impl Difference {
     pub(crate) fn of(visibility: Plane) -> Self {
-        let worst = visibility.values().iter().copied().fold(0.0, f32::max);
-        let visible = visibility.values().iter().filter(|v| **v > 1.0).count();
         Self {
-            worst_visibility: f64::from(worst),
-            visible_fraction: visible as f64 / visibility.values().len() as f64,
+            worst_visibility: f64::from(visibility.max()),
+            visible_fraction: visibility.share_above(1.0),
             visibility,
         }
     }

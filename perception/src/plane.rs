@@ -144,6 +144,31 @@ impl Plane {
         chunks.iter().sum::<f64>() / self.values.len() as f64
     }
 
+    /// Largest value, 0 at least; 0 for a plane without pixels. NaN does not count.
+    ///
+    /// ```
+    /// use fechner_perception::Plane;
+    /// assert_eq!(Plane::from_fn(5, 2, |x, y| (x * y) as f32).max(), 4.0);
+    /// assert_eq!(Plane::filled(2, 2, -1.0).max(), 0.0);
+    /// ```
+    #[must_use]
+    pub fn max(&self) -> f32 {
+        self.values.iter().copied().fold(0.0, f32::max)
+    }
+
+    /// Share of the pixels, in [0, 1], whose value is above `value`; 0 for a plane without pixels. NaN is above
+    /// nothing.
+    ///
+    /// ```
+    /// use fechner_perception::Plane;
+    /// assert_eq!(Plane::from_fn(4, 1, |x, _| x as f32).share_above(1.0), 0.5);
+    /// ```
+    #[must_use]
+    pub fn share_above(&self, value: f64) -> f64 {
+        let above = self.values.iter().filter(|own| f64::from(**own) > value).count();
+        above as f64 / self.values.len().max(1) as f64
+    }
+
     /// The value that this share of the pixels, in [0, 1], stays at or below; 0 for a plane without pixels.
     ///
     /// ```

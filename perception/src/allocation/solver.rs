@@ -237,7 +237,7 @@ impl<'a> Solver<'a> {
         let reach = self.sigma_px.map(|sigma| (2.0 * sigma).ceil() as usize);
         for _ in 0..MOST_REPAIRS {
             let excess = self.excess(samples, bounds);
-            let worst = excess.values().iter().copied().fold(0.0, f32::max);
+            let worst = excess.max();
             if worst <= 1.0 {
                 return;
             }

@@ -52,7 +52,7 @@ impl Case {
         let energy = Plane::from_fn(samples.width(), samples.height(), |x, y| {
             2.0 * gain.get(x, y) * self.variance.get(x, y) / samples.get(x, y)
         });
-        self.thresholds.pooled(&energy).values().iter().copied().fold(0.0, f32::max).sqrt()
+        self.thresholds.pooled(&energy).max().sqrt()
     }
 }
 
