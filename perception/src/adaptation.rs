@@ -11,7 +11,7 @@ use crate::threshold::POOLING_SIGMA_DEG;
 /// How luminances are averaged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mean {
-    /// What reaches the retina; what threshold curves were measured with. A firefly moves it.
+    /// The arithmetic mean: what reaches the retina, and what threshold curves were measured with. A firefly moves it.
     #[default]
     Arithmetic,
     /// exp(mean(ln L)): robust, usual for the key of a whole picture.

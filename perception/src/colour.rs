@@ -16,11 +16,11 @@ use crate::tone::acuity::{AcuityFilter, BehindAcuity};
 /// Thresholds of one picture in each of the eye's three channels.
 #[derive(Clone, Debug)]
 pub struct ColourThresholds {
-    /// Luminance.
+    /// Thresholds of errors of luminance.
     pub achromatic: ThresholdMap,
-    /// L − M.
+    /// Thresholds of errors of the red–green signal, L − M.
     pub red_green: ThresholdMap,
-    /// S − (L + M).
+    /// Thresholds of errors of the yellow–violet signal, S − (L + M).
     pub yellow_violet: ThresholdMap,
 }
 
@@ -129,7 +129,7 @@ impl ThresholdMap {
         Ok(self.seen_from_gaze(gain, channel, |freq_cpd| csf.sensitivity(freq_cpd, grey_cd_m2)))
     }
 
-    /// Gains of both chromatic channels.
+    /// Noise gains N(x) of both chromatic channels, 1/(cd/m²)²: [`Self::chromatic_noise_gain`] of each.
     ///
     /// # Errors
     /// As [`CastleChromatic::new`].
@@ -141,7 +141,7 @@ impl ThresholdMap {
         Ok(ChromaticGains { red_green: red_green?, yellow_violet: yellow_violet? })
     }
 
-    /// Gains of both chromatic channels for noise that is new in every frame.
+    /// Noise gains N(x) of both chromatic channels, 1/(cd/m²)², for noise that is new in every frame.
     ///
     /// # Errors
     /// As [`CastleChromatic::new`], and for an impossible timing.
@@ -178,9 +178,9 @@ impl ThresholdMap {
 /// N(x) of the chromatic channels, 1/(cd/m²)²: see [`ThresholdMap::chromatic_noise_gain`].
 #[derive(Clone, Debug)]
 pub struct ChromaticGains {
-    /// Of L − M.
+    /// N(x) of the red–green signal, L − M.
     pub red_green: Plane,
-    /// Of S − (L + M).
+    /// N(x) of the yellow–violet signal, S − (L + M).
     pub yellow_violet: Plane,
 }
 

@@ -17,8 +17,8 @@ pub enum ErrorMotion {
     Fresh,
     /// Error that travels with the object (from reprojected or cached samples): seen through the retinal velocity.
     Travelling,
-    /// The same noise pattern in every frame, locked to the screen: as the eye follows the object, the pattern crosses the
-    /// retina at the eye's own velocity; where the eye rests it is static noise.
+    /// Noise of one pattern in every frame, locked to the screen: as the eye follows the object, the pattern crosses
+    /// the retina at the eye's own velocity; where the eye rests it is static noise.
     Locked,
 }
 
@@ -113,7 +113,7 @@ impl VelocityTable {
 }
 
 impl ThresholdMap {
-    /// The same thresholds of noise that is new in every frame, for eyes that move at `eye_velocity_deg_s` at each place (see
+    /// Thresholds of noise that is new in every frame, for eyes that move at `eye_velocity_deg_s` at each place (see
     /// [`eye_velocity_deg_s`]; at most 80 deg/s counts): each frame is smeared over the retina while the display holds it.
     ///
     /// Only for thresholds of fresh noise ([`crate::csf::FreshNoise`] with the same timing), and only where eyes do move: a viewer

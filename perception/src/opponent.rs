@@ -8,11 +8,11 @@ use crate::photometry::{REC709_WEIGHTS, luminance};
 /// contrast sensitivity function (see [`crate::threshold::chromatic_threshold_map`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Opponent {
-    /// Luminance.
+    /// Luminance, cd/m².
     pub achromatic: f32,
-    /// L − M, positive towards red.
+    /// Red–green signal L − M, cd/m², positive towards red.
     pub red_green: f32,
-    /// S − (L + M), positive towards violet.
+    /// Yellow–violet signal S − (L + M), cd/m², positive towards violet.
     pub yellow_violet: f32,
 }
 

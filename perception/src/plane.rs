@@ -60,13 +60,13 @@ impl Plane {
         plane
     }
 
-    /// Columns.
+    /// Number of columns.
     #[must_use]
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// Number of rows.
     #[must_use]
     pub fn height(&self) -> usize {
         self.height
@@ -123,7 +123,8 @@ impl Plane {
         result
     }
 
-    /// Half of what it differs by from another of the same shape: of two halves of a picture, as strong as the noise of their mean.
+    /// Half of the difference from another plane of the same shape, (own − other) / 2: of two halves of a picture, as
+    /// strong as the noise of their mean.
     ///
     /// # Panics
     /// Unless the other plane has as many columns and rows.

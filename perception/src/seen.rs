@@ -16,7 +16,7 @@ use bent::variances_of_colour;
 use rayon::prelude::*;
 use shown::{Noise, Shown};
 
-/// What the display shows, cd/m², for scene luminance in cd/m².
+/// Displayed luminance of every pixel, cd/m², for a picture of scene luminance, cd/m².
 #[must_use]
 pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
@@ -25,7 +25,7 @@ pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_lumin
     })
 }
 
-/// The same for one pixel.
+/// Displayed luminance of one pixel, cd/m²: [`display_luminance`] at `pixel`, whose scene luminance is `scene_cd_m2`.
 #[must_use]
 pub fn display_luminance_at(fitted: &dyn FittedTone, display: &Display, pixel: Pixel, scene_cd_m2: f32) -> f32 {
     Shown { fitted, display }.cd_m2(pixel, scene_cd_m2)
@@ -76,7 +76,7 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
     })
 }
 
-/// A picture's colours, on which noise is.
+/// Colours of a picture on which there is noise.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneColours<'a> {
     /// Linear Rec. 709 RGB of any strength, row-major: noise of luminance makes it brighter and darker.
@@ -86,10 +86,10 @@ pub struct SceneColours<'a> {
 }
 
 impl SceneColours<'_> {
-    /// That of a pixel by its place in the picture.
+    /// The colour of one pixel, by its row-major index.
     ///
     /// # Panics
-    /// Outside of it.
+    /// For an index outside the picture.
     #[must_use]
     pub fn at(&self, index: usize) -> SceneColour {
         SceneColour { rgb: self.rgb[index], chromatic_slope: self.chromatic_slope.values()[index] }
@@ -125,16 +125,16 @@ pub fn display_opponent_variances(
     std::array::from_fn(|channel| Plane::from_fn(width, height, |x, y| found[y * width + x][channel]))
 }
 
-/// One pixel of [`SceneColours`].
+/// The colour of one pixel of [`SceneColours`].
 #[derive(Clone, Copy, Debug)]
 pub struct SceneColour {
     /// Linear Rec. 709 RGB of any strength.
     pub rgb: [f32; 3],
-    /// Of [`display_chromatic_slope`].
+    /// What the operator leaves of a faint tint on a grey as bright as the pixel: [`display_chromatic_slope`] there.
     pub chromatic_slope: f32,
 }
 
-/// What operator and display make of noise, for those who have it pixel by pixel.
+/// Noise behind an operator and a display: [`display_opponent_variances`] for those who have it pixel by pixel.
 pub struct NoiseShown<'a> {
     shown: Shown<'a>,
     /// Of tints on black.
@@ -142,7 +142,7 @@ pub struct NoiseShown<'a> {
 }
 
 impl<'a> NoiseShown<'a> {
-    /// Of this operator and this display.
+    /// Noise behind this operator and this display.
     #[must_use]
     pub fn new(fitted: &'a dyn FittedTone, display: &'a Display) -> Self {
         let rooms_cd_m2 = [ChromaticChannel::RedGreen, ChromaticChannel::YellowViolet]
@@ -180,7 +180,8 @@ impl<'a> NoiseShown<'a> {
     }
 }
 
-/// What of a colour, linear Rec. 709 RGB in scene cd/m², the display shows at `pixel`, cd/m²: more than where it shows nothing.
+/// Opponent signals, cd/m², of a colour (linear Rec. 709 RGB in scene cd/m²) as displayed at `pixel`: what the display
+/// shows more than where it shows nothing.
 #[must_use]
 pub fn display_opponent(fitted: &dyn FittedTone, display: &Display, pixel: Pixel, rgb_cd_m2: [f32; 3]) -> Opponent {
     Shown { fitted, display }.opponent(pixel, rgb_cd_m2)
@@ -199,8 +200,8 @@ fn room_of_tints(channel: ChromaticChannel) -> f64 {
     (row[raised] - green_for_raised * row[1]).abs() / green_for_raised
 }
 
-/// How much a chromatic signal as displayed is of that of the scene where that is faint ([`FittedTone::chromatic_slope_at`]). What
-/// a display's clip of single channels hides is not taken off.
+/// Chromatic signal as displayed over that of the scene, where that is faint, at every pixel
+/// ([`FittedTone::chromatic_slope_at`]). What a display's clip of single channels hides is not taken off.
 #[must_use]
 pub fn display_chromatic_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };

@@ -28,7 +28,7 @@ pub struct ThresholdInputs<'a> {
 }
 
 impl<'a> ThresholdInputs<'a> {
-    /// Those of a picture without noise, cd/m² on the display.
+    /// Inputs for a picture without noise, cd/m² on the display.
     #[must_use]
     pub fn clean(display_luminance_cd_m2: &'a Plane) -> Self {
         Self { display_luminance_cd_m2, guide_noise: GuideNoise::Clean }
@@ -291,7 +291,7 @@ impl ThresholdMap {
         noise_gain(&self.tables, &self.adaptation_cd_m2, &[])
     }
 
-    /// The same map with [`masking_elevation`](Self::masking_elevation) 1 everywhere: nothing hides error.
+    /// This map with [`masking_elevation`](Self::masking_elevation) 1 everywhere: nothing hides error.
     #[must_use]
     pub fn without_masking(mut self) -> Self {
         self.noise_gain = self.unmasked_noise_gain();
@@ -299,7 +299,8 @@ impl ThresholdMap {
         self
     }
 
-    /// The same thresholds for error that moves over the retina at `retinal_velocity_deg_s` (see [`crate::motion`]).
+    /// Thresholds of this picture for error that moves over the retina at `retinal_velocity_deg_s` (see
+    /// [`crate::motion`]).
     ///
     /// Each band's threshold is raised, or at low frequencies lowered, by the ratio of Daly's 1998 spatiovelocity
     /// sensitivity at rest to that in motion at the band's centre, kept within 0.1 and 20. What moves no faster than the eye drifts
@@ -333,13 +334,13 @@ impl ThresholdMap {
         &self.viewing
     }
 
-    /// Columns, pixels.
+    /// Columns of the map, pixels.
     #[must_use]
     pub fn width(&self) -> usize {
         self.adaptation_cd_m2.width()
     }
 
-    /// Rows, pixels.
+    /// Rows of the map, pixels.
     #[must_use]
     pub fn height(&self) -> usize {
         self.adaptation_cd_m2.height()

@@ -13,10 +13,10 @@ use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
 /// The square of [`LARGEST_RELATIVE_ERROR`].
 const LARGEST_RELATIVE_VARIANCE: f32 = LARGEST_RELATIVE_ERROR * LARGEST_RELATIVE_ERROR;
 
-/// What a measured error looks like.
+/// Visibility of a measured error, pooled and not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredError {
-    /// v(x) in threshold units: pooled, times √2.
+    /// Visibility v(x) in threshold units: pooled, times √2.
     pub visibility: Plane,
     /// The unpooled amplitude sqrt(Σ_b `V_b`²) at each pixel in threshold units: what a lone bright pixel shows,
     /// which pooling would hide.

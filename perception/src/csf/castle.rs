@@ -17,7 +17,7 @@ pub struct CastleCsf {
 }
 
 impl CastleCsf {
-    /// For gratings that cover `area_deg2` square degrees.
+    /// castleCSF for gratings that cover `area_deg2` square degrees.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] unless the area lies between 0.001 and 10 000 deg².
@@ -26,7 +26,7 @@ impl CastleCsf {
         Ok(Self { area_deg2 })
     }
 
-    /// The grating's area, deg².
+    /// Area of the gratings, deg².
     #[must_use]
     pub fn area_deg2(&self) -> f64 {
         self.area_deg2

@@ -12,7 +12,7 @@ use crate::table::Between;
 /// is at least 1 Hz, and at 0 Hz there is the sustained channel alone, so that the static case equals [`CastleCsf`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CastleTemporal {
-    /// The static function.
+    /// The sustained channel at 0 Hz, which is the static function, and whose area the transient channel has too.
     pub sustained: CastleCsf,
     /// Temporal frequency, Hz: spatial frequency times retinal velocity for a drifting grating.
     pub temporal_hz: f64,

@@ -8,7 +8,7 @@ use super::ContrastSensitivity;
 /// set: the code in circulation that goes with castleCSF has refitted constants and passes degrees to the cosine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Daly93 {
-    /// Area i², deg².
+    /// Area of the image, i² in the formula, deg².
     pub area_deg2: f64,
     /// Viewing distance, m.
     pub distance_m: f64,

@@ -18,7 +18,7 @@ pub struct Daly98 {
 pub const DRIFT_DEG_S: f64 = 0.15;
 /// The fastest smooth pursuit, deg/s (Daly 1998).
 pub const FASTEST_PURSUIT_DEG_S: f64 = 80.0;
-/// Gain of smooth pursuit (Daly 1998).
+/// Gain of smooth pursuit: velocity of the eye over that of what it follows (Daly 1998).
 pub const PURSUIT_GAIN: f64 = 0.82;
 
 /// Kelly's surface with constants: S = k · `gain` · c₂ v (2π ρ c₁)² exp(−4π c₁ ρ / `ρ_max`).

@@ -8,7 +8,7 @@ use super::ContrastSensitivity;
 /// absolute scale (31 at best at 20 cd/m²) and knows no area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HdrVdp2 {
-    /// Multiplies the published function.
+    /// Factor on the published function, which has no absolute scale.
     pub gain: f64,
 }
 

@@ -9,7 +9,7 @@ use super::{ContrastSensitivity, HIGHEST_CPD};
 /// comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MannosSakrison {
-    /// Multiplies the normalised function.
+    /// Factor on the published function, which is at most 0.981.
     pub gain: f64,
 }
 

@@ -42,7 +42,7 @@ use std::f64::consts::PI;
 
 /// A contrast sensitivity function for static, achromatic gratings seen foveally.
 pub trait ContrastSensitivity: Send + Sync {
-    /// What the command line calls it.
+    /// The function's name on the command line.
     fn name(&self) -> &'static str;
 
     /// Sensitivity (1 / threshold contrast) at `freq_cpd` cycles per degree on a mean luminance of `luminance_cd_m2`.
@@ -57,7 +57,8 @@ pub trait ContrastSensitivity: Send + Sync {
         1.0
     }
 
-    /// Sensitivity of the eye to what gets there.
+    /// Sensitivity of the eye to the share of a grating that gets there: [`sensitivity`](Self::sensitivity) over
+    /// [`transfer`](Self::transfer).
     fn sensitivity_behind(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
         // What gets through by less than that is as good as lost.
         self.sensitivity(freq_cpd, luminance_cd_m2) / self.transfer(freq_cpd).max(1e-100)

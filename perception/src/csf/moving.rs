@@ -7,7 +7,7 @@ use super::{ContrastSensitivity, Daly98};
 /// At rest (0.15 deg/s, the eye's drift) it equals the static function exactly; luminance and area stay the static
 /// function's.
 pub struct Moving<'a> {
-    /// The static function.
+    /// The static contrast sensitivity function that is set in motion.
     pub base: &'a dyn ContrastSensitivity,
     /// Velocity over the retina, deg/s.
     pub retinal_velocity_deg_s: f64,

@@ -25,14 +25,15 @@ pub struct GuideInputs<'a> {
     pub variance: &'a Plane,
     /// Albedo of the first surface, 0..1.
     pub albedo: &'a [[f32; 3]],
-    /// Its normal, unit length, or 0 where there is none.
+    /// Normal of the first surface, of unit length, or 0 where there is none.
     pub normal: &'a [[f32; 3]],
-    /// Its distance, in any unit. Not finite where there is none, which is a neighbour of nothing else. A mean over samples of which some
-    /// met nothing, counted as 0, is fine as well: such pixels are told apart as surfaces that are nearer.
+    /// Distance of the first surface, in any unit. Not finite where there is none, which is a neighbour of nothing
+    /// else. A mean over samples of which some met nothing, counted as 0, is fine as well: such pixels are told apart
+    /// as surfaces that are nearer.
     pub depth: &'a [f32],
-    /// Columns.
+    /// Columns of the picture, pixels.
     pub width: usize,
-    /// Rows.
+    /// Rows of the picture, pixels.
     pub height: usize,
 }
 

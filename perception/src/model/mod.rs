@@ -39,9 +39,9 @@ pub struct ModelInputs<'a> {
     pub image_velocity_deg_s: Option<&'a Plane>,
     /// How much each pixel attracts the gaze, 0..1 (see [`crate::saliency`]); `None` is 1: everything is followed.
     pub attention: Option<&'a Plane>,
-    /// Who looks from where.
+    /// The eye, the display and its distance.
     pub viewing: &'a Viewing,
-    /// Contrast sensitivity.
+    /// Contrast sensitivity function of the eye; not every model asks it ([`ThresholdModel::knows_csf`]).
     pub csf: &'a dyn ContrastSensitivity,
 }
 
@@ -75,7 +75,7 @@ impl ModelInputs<'_> {
 
 /// A rule for how much noise may remain.
 pub trait ThresholdModel: Send + Sync {
-    /// What the command line calls it.
+    /// The model's name on the command line.
     fn name(&self) -> &'static str;
 
     /// Standard error of the pixel's mean, cd/m² on the display, at which noise is at threshold. Finite and positive.
@@ -154,7 +154,7 @@ pub fn names() -> &'static [&'static str] {
     &NAMES
 }
 
-/// The model of that name, with its defaults.
+/// The threshold model of that name, with its defaults; `None` where there is none.
 ///
 /// ```
 /// use fechner_perception::model;
@@ -166,7 +166,7 @@ pub fn by_name(name: &str) -> Option<Box<dyn ThresholdModel>> {
     find(&MODELS, name).map(|constructor| constructor())
 }
 
-/// [`by_name`], for names that somebody has given.
+/// The threshold model of a name that somebody has given: [`by_name`], with an error instead of `None`.
 ///
 /// # Errors
 /// [`Error::UnknownName`], which lists those that there are.

@@ -19,7 +19,7 @@ use crate::tvi::ThresholdBase;
 /// [`super::CsfBands`] does not.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ramasubramanian {
-    /// Start from the published TVI curve.
+    /// Whether thresholds start from the published TVI curve, not from `L_a` over the peak of contrast sensitivity.
     pub raw_tvi: bool,
 }
 

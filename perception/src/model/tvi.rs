@@ -13,7 +13,7 @@ use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 /// sensitivity, and it knows neither resolution nor texture nor motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tvi {
-    /// Lower the curve by 0.95 log units, to where contrast sensitivity puts it.
+    /// Whether the curve is lowered by 0.95 log units, to where contrast sensitivity puts it.
     pub shifted: bool,
 }
 

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 pub struct FrameMotion {
     /// Where each pixel's content will be one frame later, less where it is.
     pub to_next: [Plane; 2],
-    /// Where it was one frame earlier, less where it is.
+    /// Where each pixel's content was one frame earlier, less where it is.
     pub to_previous: [Plane; 2],
 }
 

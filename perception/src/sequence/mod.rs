@@ -43,7 +43,7 @@ pub struct SequenceFrame {
 }
 
 impl SequenceFrame {
-    /// Takes displayed colours, linear Rec. 709 RGB in cd/m², row-major. Without motion the eye rests.
+    /// A frame of displayed colours, linear Rec. 709 RGB in cd/m², row-major. Without motion the eye rests.
     ///
     /// # Errors
     /// [`Error::ValueCount`] unless both pictures have `width * height` pixels, [`Error::Empty`] without pixels,
@@ -113,8 +113,8 @@ struct Filters<'a> {
 }
 
 impl SequenceObserver {
-    /// In front of a display that shows `viewing.display.frames_per_second` new frames a second, each lit for its
-    /// `persistence`.
+    /// An observer in front of a display that shows `viewing.display.frames_per_second` new frames a second, each lit
+    /// for its `persistence`.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for an impossible viewing.
@@ -125,7 +125,7 @@ impl SequenceObserver {
         Ok(Self { viewing: viewing.clone(), responses: FrameResponses::new(timing)? })
     }
 
-    /// How many frames before and after one have to do with it.
+    /// How many frames before a frame, and as many after it, have a part in how it is seen.
     #[must_use]
     pub fn reach(&self) -> usize {
         self.responses.reach()

@@ -26,7 +26,7 @@ pub enum Exposure {
 pub struct Constant {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the exposure aims at.
+    /// Which pixels are exposed for.
     pub time: Exposure,
 }
 

@@ -16,7 +16,7 @@ use crate::photometry::luminance;
 pub struct DurandDorsey00 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the eye is adapted to.
+    /// Whether the eye is adapted to the view as a whole or to each place.
     pub scope: AdaptationScope,
 }
 

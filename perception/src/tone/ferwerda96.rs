@@ -17,7 +17,7 @@ use crate::display::Viewing;
 pub struct Ferwerda96 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the eye is adapted to.
+    /// Whether the eye is adapted to the view as a whole or to each place.
     pub scope: AdaptationScope,
     /// Whether fine detail is lost in dim light.
     pub acuity: bool,

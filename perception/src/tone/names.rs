@@ -24,14 +24,14 @@ pub struct Effects {
 pub struct ToneSettings {
     /// Multiplies light by 2^stops: before the curve of `agx`, `pbr-neutral` and `reinhard02`, after the others.
     pub exposure_stops: f64,
-    /// What the eye is adapted to, for the operators that know both.
+    /// Whether the eye is adapted to the view as a whole or to each place, for the operators that know both.
     pub scope: AdaptationScope,
-    /// `None`: what the operator's authors had, which is acuity and colour for `ferwerda96` and nothing for
-    /// `ward-larson97`.
+    /// Effects that are shown; `None` for what the operator's authors had, which is acuity and colour for `ferwerda96`
+    /// and nothing for `ward-larson97`.
     pub effects: Option<Effects>,
 }
 
-/// The operator where nobody names one.
+/// Name of the operator that is meant where none is named.
 pub const DEFAULT_OPERATOR: &str = "constant";
 
 /// Makes an operator that multiplies light by `exposure`, with the other settings that it knows.
@@ -69,7 +69,8 @@ const OPERATOR_NAMES: [&str; OPERATORS.len()] = names_of(&OPERATORS);
 const OPERATOR_INITIALS: NamedTable<&str, 4> =
     [("tr", "tumblin-rushmeier"), ("fpsg", "ferwerda96"), ("wrp", "ward-larson97"), ("ptyg", "pattanaik00")];
 
-/// The operator of that name. `exposure_stops` multiplies what it shows by 2^stops; `None` is 0.
+/// The operator of that name or initials; `None` where there is none. `exposure_stops` multiplies what it shows by
+/// 2^stops; `None` is 0.
 ///
 /// ```
 /// use fechner_perception::tone;
@@ -82,7 +83,8 @@ pub fn operator(name: &str, exposure_stops: Option<f64>) -> Option<Box<dyn ToneO
     operator_with(name, &ToneSettings { exposure_stops: exposure_stops.unwrap_or(0.0), ..ToneSettings::default() })
 }
 
-/// The operator of that name or of its authors' initials (`tr`, `fpsg`, `wrp`, `ptyg`).
+/// The operator of that name or of its authors' initials (`tr`, `fpsg`, `wrp`, `ptyg`), set like this; `None` where
+/// there is none.
 #[must_use]
 pub fn operator_with(name: &str, settings: &ToneSettings) -> Option<Box<dyn ToneOperator>> {
     let stops = if settings.exposure_stops.is_finite() { settings.exposure_stops } else { 0.0 };
@@ -91,7 +93,7 @@ pub fn operator_with(name: &str, settings: &ToneSettings) -> Option<Box<dyn Tone
     find(&OPERATORS, full_name).map(|constructor| constructor(exposure, settings))
 }
 
-/// [`operator_with`], for names that somebody has given.
+/// The operator of a name that somebody has given: [`operator_with`], with an error instead of `None`.
 ///
 /// # Errors
 /// [`Error::UnknownName`], which lists those that there are.

@@ -27,8 +27,8 @@ use crate::photometry::{luminance, scotopic_luminance};
 pub struct Pattanaik00 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the eye is adapted to. With [`AdaptationScope::Local`] responses are local, reference white and black those of
-    /// the view.
+    /// Whether the eye is adapted to the view as a whole or to each place. With [`AdaptationScope::Local`] responses
+    /// are local, reference white and black those of the view.
     pub scope: AdaptationScope,
 }
 

@@ -31,7 +31,7 @@ impl ToneOperator for Scheel00 {
         true
     }
 
-    /// Of the centre-weighted points, over time too.
+    /// The goal of the centre-weighted points, over time too.
     fn goal(&self, guide: &SceneGuide<'_>, density: PixelDensity) -> Goal {
         let view = Goal::of(guide, density);
         let of_points =

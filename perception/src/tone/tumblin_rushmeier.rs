@@ -21,7 +21,7 @@ use crate::display::Viewing;
 pub struct TumblinRushmeier {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the eye is adapted to.
+    /// Whether the eye is adapted to the view as a whole or to each place.
     pub scope: AdaptationScope,
 }
 

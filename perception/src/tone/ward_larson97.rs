@@ -34,9 +34,9 @@ use adjustment::{Adjustment, DisplayRange, Histogram};
 pub struct WardLarson97 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What bounds the contrast.
+    /// What bounds the displayed contrast.
     pub ceiling: Ceiling,
-    /// What else the eye loses.
+    /// What is shown of what the eye loses besides brightness.
     pub effects: Effects,
 }
 
