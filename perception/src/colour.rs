@@ -238,7 +238,8 @@ mod tests {
         assert!(night.is_some() && of_colour(night) < 0.9 * seen, "{} of {seen}", of_colour(night));
     }
 
-    /// The mean of two halves: its own noise hid most of what it was judged by.
+    /// A picture that is the mean of two noisy halves. Regression: its own noise masked most of the noise that it is
+    /// judged by.
     #[test]
     fn noise_of_colour_does_not_hide_itself() {
         let error = noise(|value| red_for_green(40.0 * value));

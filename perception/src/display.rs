@@ -272,7 +272,8 @@ mod tests {
         assert!((display.luminance_cd_m2(7.0) - 201.0).abs() < 1e-9);
     }
 
-    /// BT.1886 lifts its curve by the display's black: code 0.05 was 0.28 cd/m² on a television that has 0.61.
+    /// BT.1886 lifts its curve by the display's black. Regression: code 0.05 came out as 0.28 cd/m² on a television
+    /// that shows 0.61.
     #[test]
     fn codes_are_shown_from_black_to_white() {
         for name in Display::preset_names() {

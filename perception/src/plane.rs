@@ -18,7 +18,7 @@ pub struct Plane {
 /// Luminance above which nothing is answered: sums over windows must stay within `f32`.
 const LARGEST_LUMINANCE_CD_M2: f32 = 1e30;
 
-/// Pixels that are worth handing to another thread: 16,384 left a second core idle at 128×128.
+/// Pixels that are worth handing to another thread. Measured at 128×128 pixels: 16,384 leave a second core idle.
 pub const PIXELS_A_TASK: usize = 1 << 12;
 
 impl Plane {
@@ -276,7 +276,7 @@ mod tests {
         assert_eq!(plane.get(2, 1), 12.0);
     }
 
-    /// The number of pixels went round: this plane had two values.
+    /// Regression: the number of pixels wrapped around, and this plane had two values.
     #[test]
     #[should_panic(expected = "capacity overflow")]
     fn more_pixels_than_can_be_counted_are_refused() {

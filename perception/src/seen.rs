@@ -56,9 +56,9 @@ pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance
 /// σ is how far the mean is off by them, not 3σ²/M, which may be far above a clip. An operator that is linear over the
 /// points gives exactly its slope² · σ².
 ///
-/// Of a point lamp 6 cm below a ceiling 16 samples a pixel leave noise of visibility 19.7 ± 2.0 by the thresholds of the
-/// converged picture, 14 by its comparison: by the three points alone it was told as 10.8, by M + σ alone as 26.2, and is
-/// as 19.9 (`benches/results/beyond-white.md`).
+/// Measured on a point lamp 6 cm below a ceiling at 16 samples a pixel (`benches/results/beyond-white.md`): visibility
+/// 19.7 ± 2.0 by the thresholds of the converged picture, 14 by comparison with it; predicted by the three points alone
+/// 10.8, by M + σ alone 26.2, by this rule 19.9.
 ///
 /// Where normal noise (√3 σ ≤ M) reaches over a clip of the display, three points see too much of it or nothing at all; there the
 /// operator is asked at 21 points, −4σ to 4σ.
@@ -285,8 +285,9 @@ mod tests {
         }
     }
 
-    /// One sample in 200 brings all light, and 16 are taken: what each pixel's own variance makes of it, on the mean of all, is what the means of
-    /// pixels show, or half of that where the three points reach above white, which alone said nothing.
+    /// One sample in 200 brings all light, and 16 are taken: what each pixel's own variance makes of it, on the mean of
+    /// all, is what the means of pixels show, or half of that where the three points reach above white. Regression: the
+    /// three points alone said that nothing shows there.
     #[test]
     fn light_that_few_samples_bring_shows_at_a_clip() {
         let display = Display::default();
@@ -391,8 +392,9 @@ mod tests {
         }
     }
 
-    /// A colour pales as it brightens, and noise of its luminance is noise of its colour, by 2001 such luminances: by what the operator leaves
-    /// of tints alone the last three were told as 0.54, 0.39 and 0.19 of it.
+    /// A colour pales as it brightens, and noise of its luminance is noise of its colour, by 2001 such luminances.
+    /// Regression: with what the operator leaves of tints alone, the last three cases were predicted as 0.54, 0.39 and
+    /// 0.19 of it.
     #[test]
     fn noise_of_luminance_pales_colours() {
         let display = Display::default();
@@ -442,8 +444,9 @@ mod tests {
         Tint(f64),
     }
 
-    /// Of a colour whose channels are bent or clipped each by itself, against 2001 lights. By tints of greys a blue beyond its clip was told as
-    /// 7 times what is seen, and one of whose luminance is beyond white as nothing.
+    /// Noise of a colour whose channels are bent or clipped each by itself, against 2001 lights. Regression: judged by
+    /// tints of greys, noise of a blue beyond its clip was predicted as 7 times what is seen, and that of a blue whose
+    /// luminance is beyond white as nothing.
     #[test]
     fn noise_of_colours_is_told_where_channels_are_bent_alone() {
         let display = Display::default();

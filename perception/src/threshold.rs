@@ -189,8 +189,9 @@ fn assemble(
 const FEW_PIXELS: usize = 1 << 16;
 
 /// Contrast of a mask, in adaptation luminances, beyond which more would mask no more (a few threshold units are the cap) and only
-/// cost the rest of the transform its precision: beside a lone lamp of 1e5 × white its rounding raised thresholds threefold all over the
-/// picture. Shown pictures stay below: a night view with lamps of 1000 × its black reached 25.
+/// cost the rest of the transform its precision. Measured without it, beside a lone lamp of 1e5 × white: rounding
+/// raises thresholds threefold all over the picture. Shown pictures stay below: a night view with lamps of 1000 × its
+/// black reaches 25.
 const LARGEST_MASK_CONTRAST: f32 = 30.0;
 
 /// Who looks, and what is tabulated of it.

@@ -213,7 +213,7 @@ pub fn peak_sensitivity(csf: &dyn ContrastSensitivity, luminance_cd_m2: f64) -> 
 mod tests {
     use super::*;
 
-    /// Products that overflowed made NaN of four functions.
+    /// Regression: four functions were NaN where products overflowed.
     #[test]
     fn every_frequency_has_a_sensitivity() {
         for name in names() {
@@ -241,7 +241,8 @@ mod tests {
         }
     }
 
-    /// Beyond what is asked for nothing counts, where the greatest sensitivity is at an end: the search went on to 0.0448 and 67 cpd.
+    /// Frequencies beyond 0.05 to 60 cpd do not count, where the greatest sensitivity is at an end. Regression: the
+    /// search went on to 0.0448 and 67 cpd.
     #[test]
     fn peaks_are_looked_for_where_it_is_said() {
         struct Slope(f64);

@@ -159,7 +159,8 @@ mod tests {
         assert_eq!((phone.white_cd_m2, phone.pixels_per_degree), (700.0, 90.0));
     }
 
-    /// What is not the preset has not its name: messages said that "desktop" is not as bright as "desktop".
+    /// A display that is not the preset has not its name. Regression: messages said that "desktop" is not as bright as
+    /// "desktop".
     #[test]
     fn a_changed_preset_is_called_so() {
         let name = |text: &str| Display::from_toml(text).unwrap().name;

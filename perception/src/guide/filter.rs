@@ -34,7 +34,7 @@ fn falling(x: Vec4) -> Vec4 {
 }
 
 /// One pass over a 3×3 kernel whose taps lie `hole` pixels apart, at most [`BORDER`]. All taps of a few columns at once, so that
-/// sums stay in vector registers: tap by tap along whole rows it took three times the instructions.
+/// sums stay in vector registers: tap by tap along whole rows it takes three times the instructions.
 pub(super) fn filter_pass(
     light: &Rows<LIGHT_CHANNELS>,
     surfaces: &Rows<SURFACE_CHANNELS>,

@@ -276,8 +276,10 @@ impl SequenceObserver {
             threshold_map(&inputs, &self.viewing, &csf)
         };
         let achromatic = masked_by_both(map_of(&reference)?, &map_of(&test)?);
-        // The transient channel of an eye adapted to a dark shot holds as much of a bright one 0.2 s away as of the frame that is shown, which is
-        // not seen against the dark alone: an error of 2 % on 950 cd/m² had 3.5 in equal dark frames before the cut, 0.9 in its own.
+        // Flicker is judged under the brightest light that any channel holds: the transient channel of an eye adapted
+        // to a dark shot holds as much of a bright one 0.2 s away as of the frame that is shown, and that is not seen
+        // against the dark alone. Measured against the dark alone on an error of 2 % on 950 cd/m²: visibility 3.5 in
+        // equal dark frames before the cut, 0.9 in its own.
         let brightest = plane(&|light| light.reference[0].max(light.around));
         let adaptation_cd_m2 = adapted(&brightest, &self.viewing);
         let (least, greatest) = adaptation_cd_m2.range();

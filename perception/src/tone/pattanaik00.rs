@@ -34,7 +34,7 @@ pub struct Pattanaik00 {
 
 /// Exponent of the response.
 const POWER: f64 = 0.73;
-/// Light to the power of the response, and back: half of an operator's time was `powf`.
+/// Light to the power of the response, and back, by tables: `powf` would be half of the operator's time.
 static RAISED: LazyLock<FixedPower> = LazyLock::new(|| FixedPower::new(POWER));
 static LOWERED: LazyLock<FixedPower> = LazyLock::new(|| FixedPower::new(POWER.recip()));
 const WHITE_FACTOR: f64 = 5.0;

@@ -60,7 +60,7 @@ pub(super) fn weighted_log_average_to_eyes(
 }
 
 /// Geometric mean of the pixels that are lit, whatever the unit; `None` for a black picture. Pixels too few to count
-/// ([`TOO_FEW`]) make no others darkness: one of 1e12 took all the rest for it.
+/// ([`TOO_FEW`]) make no others darkness: beside a single one of 1e12 all the rest would be.
 pub(super) fn log_average_of_lit(luminance: &Plane) -> Option<f64> {
     let sorted = sorted_lit(luminance);
     let brightest = enough_of_the_brightest(&sorted, luminance.values().len()).last();
@@ -141,7 +141,8 @@ impl SceneStatistics {
 ///
 /// What may be exposed for lies within 20 stops of the brightest pixel, and where that is [`TOO_FEW`] pixels, of the brightest
 /// below them. A quantile of all that is lit would not do: it is leaked light itself wherever a leaking background is
-/// most of the picture, and 4.8 % of it at 20 to 100 cd/m² before 1e-6 were exposed 4e7 times as long as 5.3 %.
+/// most of the picture. Measured with such a quantile, pixels of 20 to 100 cd/m² before a background of 1e-6: where
+/// they are 4.8 % of the picture they are exposed 4e7 times as long as where they are 5.3 %.
 fn floor_cd_m2(sorted_cd_m2: &[f32], pixel_count: usize) -> f32 {
     DARKEST_SHARE * quantile(enough_of_the_brightest(sorted_cd_m2, pixel_count), ORDINARY).unwrap_or(0.0)
 }

@@ -27,9 +27,9 @@ pub(super) struct Veil {
     mean_cd_m2: f32,
 }
 
-/// Size of a cell: all of a picture have one, which need not be whole pixels. When the last column was what the others left and weighed
-/// as much as they did, a lamp of 5 pixels at the right border of 130 lit what is 20 pixels away 2.5 times as much as one at the
-/// left.
+/// Size of a cell: all of a picture have one, which need not be whole pixels, since a last column of what the others
+/// leave would weigh as much as they do. Measured with such a column, 130 pixels wide: a lamp of 5 pixels at the right
+/// border lights what is 20 pixels away 2.5 times as much as one at the left.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct CellSize {
     width_px: f64,
