@@ -1,4 +1,8 @@
 //! What the eye is adapted to.
+//!
+//! The mean luminance over a Gaussian as wide as a disc of 1°, at which thresholds are taken. Not for the course of
+//! adaptation over time ([`crate::tone::AdaptationState`]), and not for noisy pictures as they are: of noise only lone
+//! fireflies and pairs are brought down, so give a denoised guide.
 
 use crate::display::{Display, Viewing};
 use crate::error::Error;

@@ -5,6 +5,9 @@
 //! nᵢ = √(wᵢ μᵢ / cᵢ), w = 2 N σ², clamped: Neyman's allocation, weighted by what the eye pools. Multipliers grow where the
 //! constraint is violated and fade where it is slack; by weak duality any of them bounds the cheapest cost from below,
 //! which is the certificate every [`Allocation`] carries.
+//!
+//! For noise that is independent from pixel to pixel and whose variance falls as 1/n. Not for bias, which no count
+//! brings down, nor for masks that change while samples come: thresholds are taken as given.
 
 mod block_grid;
 mod solver;

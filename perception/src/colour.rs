@@ -1,4 +1,9 @@
 //! Visibility of colour errors: over the achromatic, red–green and yellow–violet channels the largest counts.
+//!
+//! Through castleCSF's achromatic and chromatic mechanisms (Ashraf et al. 2024). Each channel is masked by its own
+//! contrast alone, and visibilities of channels do not add. Not for thresholds of fine red–green patterns: the
+//! function's fall there is an extrapolation beyond its data, by which fine red–green noise counts for more than it
+//! should.
 
 use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel, ContrastSensitivity, FrameTiming};
 use crate::display::Viewing;

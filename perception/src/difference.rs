@@ -1,4 +1,8 @@
 //! A visible-differences predictor: can one picture be told from another?
+//!
+//! After Daly 1993, for two stills that lie pixel on pixel: a shift by a pixel is a difference as any other. Not for
+//! moving pictures ([`crate::sequence`]), and not for how good a picture is: it says whether a difference is seen, and
+//! its scale is thresholds.
 
 use crate::colour::Channels;
 use crate::csf::{CastleChromatic, ChromaticChannel, ContrastSensitivity};

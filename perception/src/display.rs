@@ -1,4 +1,7 @@
 //! The display, and who looks at it from where.
+//!
+//! A display is as fine to the eye everywhere as at its centre. Not for flat screens that fill the view: pixels are
+//! finer to the eye towards their rim.
 
 mod file;
 

@@ -1,4 +1,8 @@
 //! Masking: how much a band's own contrast raises its threshold.
+//!
+//! Each octave band is masked by its own contrast (Daly 1993), up to three times. Orientation is ignored: a mask hides
+//! error across it as well as along it. Not for masking between bands or channels, of which there is none here, and not
+//! of lone edges, which mask nothing beside them.
 
 use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::csf::ContrastSensitivity;

@@ -1,4 +1,8 @@
 //! Motion: what moves over the picture, and what of it moves over the retina.
+//!
+//! The eye's pursuit is Daly's (1998), by attention as Yee, Pattanaik and Greenberg have it (2001). For error that
+//! travels with things or is locked to the screen. Not for noise that is new in every frame, of which motion hides
+//! nothing, but for what the eye's own movement smears ([`ThresholdMap::with_pursuit`]).
 
 use crate::csf::pursued_noise::PursuedNoise;
 use crate::csf::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, FrameTiming, PURSUIT_GAIN};

@@ -1,4 +1,7 @@
 //! Opponent colour: what the eye makes of RGB behind the cones.
+//!
+//! castleCSF's mechanisms (Ashraf et al. 2024) on the cones of CIE 170-1:2006, for error over the adaptation luminance.
+//! Not for how colours look: there is no hue or saturation in it, and no chromatic adaptation.
 
 use crate::photometry::{REC709_WEIGHTS, luminance};
 

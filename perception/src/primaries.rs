@@ -1,4 +1,7 @@
 //! Colour spaces by their primaries.
+//!
+//! For colours that are to stay the same. Not for bringing them into what a display can show: what another space does
+//! not hold gets negative channels ([`crate::tone::gamut`]).
 
 /// A 3×3 matrix, row by row.
 pub type Matrix = [[f64; 3]; 3];

@@ -3,6 +3,9 @@
 //! Itti, Koch and Niebur, "A model of saliency-based visual attention for rapid scene analysis", IEEE PAMI 20(11), 1998:
 //! centre–surround differences of intensity, opponent colour and orientation over a pyramid; and of motion, as Yee,
 //! Pattanaik and Greenberg added in 2001.
+//!
+//! It is of what draws the eye by itself, and knows no task, no faces and no text. Not for thresholds of stills:
+//! attention decides what moving things the eye follows ([`crate::motion`]), and changes nothing where nothing moves.
 
 use crate::display::Display;
 use crate::error::Error;

@@ -2,6 +2,9 @@
 //!
 //! A pixel's error is pushed through the operator by itself, with what the eye is adapted to at that pixel; how a local
 //! operator would spread it to other pixels is ignored.
+//!
+//! Not for what an operator does before its curve: loss of acuity is a filter on light and noise alike
+//! ([`crate::tone::acuity`]).
 
 mod bent;
 mod shown;

@@ -1,4 +1,9 @@
 //! The threshold map: how much error each pixel of a picture may have before it is seen.
+//!
+//! For a still in display cd/m², and error in it. Not for pictures with noise that nobody knows of, since noise that
+//! passes for texture hides noise: denoise them ([`crate::guide`]) or say how strong it is ([`GuideNoise`]). For motion
+//! see [`ThresholdMap::with_motion`] and [`ThresholdMap::with_pursuit`], for differences of moving pictures
+//! [`crate::sequence`].
 
 use crate::adaptation::adapted;
 use crate::bands::OctaveBands;

@@ -3,6 +3,9 @@
 //! v(x) = √2 · sqrt(g ⊗ E\[V²\])(x), where V is the display error over the adaptation luminance, through the contrast
 //! sensitivity function and divided by each band's masking, and g is a Gaussian of σ 0.25°. Bands add by energy. A
 //! grating at its threshold has v = 1: the √2 turns its RMS into its amplitude.
+//!
+//! For whether an error is seen, and how far it is above threshold or below. Not for how much it disturbs: twice the
+//! visibility is twice the amplitude, and no judgement of quality.
 
 use crate::error_filters::{ErrorFilters, LARGEST_RELATIVE_ERROR};
 use crate::filter::gaussian_blur_xy;

@@ -1,4 +1,9 @@
-//! castleCSF.
+//! castleCSF's sustained achromatic channel (Ashraf et al. 2024): the function that everything uses unless told
+//! otherwise.
+//!
+//! For static gratings in the fovea, from 0.001 to 10 000 cd/m² and up to 64 cpd. Not for flicker and drift
+//! ([`super::CastleTemporal`]), nor for colour ([`super::CastleChromatic`]); away from the gaze [`crate::eccentricity`]
+//! takes off.
 
 use super::{ContrastSensitivity, check_area_deg2};
 use crate::error::Error;

@@ -1,4 +1,8 @@
-//! castleCSF for gratings that flicker or drift.
+//! castleCSF for gratings that flicker or drift: its sustained and its transient channel together (Ashraf et al. 2024).
+//!
+//! For one temporal frequency. Not for noise that is new in every frame, which holds all of them at once
+//! ([`super::FreshNoise`]). Below 0.03 cd/m² the transient channel's best flicker is held at 1 Hz, which is ours and no
+//! measurement.
 
 use super::ContrastSensitivity;
 use super::castle::{CastleCsf, DOMAIN_DECADES, Summation, in_domain};

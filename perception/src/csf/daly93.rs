@@ -1,4 +1,7 @@
-//! The contrast sensitivity of Daly's visible differences predictor.
+//! The contrast sensitivity of Daly's visible differences predictor, 1993.
+//!
+//! For comparison with that predictor: static gratings in the fovea, by area, distance and orientation. Not for motion
+//! or colour, and not at the lowest frequencies, where its area term takes sensitivity to 0.
 
 use super::ContrastSensitivity;
 

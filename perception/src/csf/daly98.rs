@@ -1,4 +1,7 @@
-//! Daly's spatiovelocity contrast sensitivity.
+//! Daly's spatiovelocity contrast sensitivity, 1998, after Kelly 1979: gratings that move over the retina.
+//!
+//! For ratios between velocities ([`super::Moving`], [`crate::motion`]). Not for absolute thresholds: it knows neither
+//! area nor luminance, and is for about 100 cd/m², 0.15 to 80 deg/s and 0.1 to 60 cpd.
 
 use super::{ContrastSensitivity, HIGHEST_CPD};
 

@@ -1,4 +1,7 @@
 //! What a frame of a moving picture leaves in the eye's temporal channels, a frame and several frames away.
+//!
+//! For frames within 0.2 s of the one that is shown. Not for the flicker that a display of short flashes adds to all
+//! that it shows, which is left out.
 
 use super::castle_chromatic::ChromaticChannel;
 use super::castle_temporal::{between_levels, levels_cd_m2, sustained_response, transient_response};

@@ -1,4 +1,7 @@
-//! The contrast sensitivity inside HDR-VDP 2.
+//! The contrast sensitivity inside HDR-VDP 2 (Mantiuk et al. 2011), by frequency and luminance.
+//!
+//! For comparison with that metric. Not for absolute thresholds, of which it has no scale, and not where area, motion
+//! or colour matter: it knows none.
 
 use super::ContrastSensitivity;
 

@@ -1,4 +1,7 @@
-//! The first contrast sensitivity function of image coding.
+//! The first contrast sensitivity function of image coding (Mannos and Sakrison 1974).
+//!
+//! For teaching and comparison. Not for thresholds: it knows frequency alone, neither luminance nor area nor motion,
+//! and its scale is a gain that is given to it.
 
 use super::{ContrastSensitivity, HIGHEST_CPD};
 

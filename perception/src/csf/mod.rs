@@ -2,6 +2,9 @@
 //!
 //! S = 1 / (contrast amplitude at threshold), contrast = amplitude / mean luminance. The threshold *amplitude* of a
 //! grating of ρ cycles per degree on L cd/m² is therefore L / S(ρ, L) cd/m².
+//!
+//! All are of gratings, static, achromatic and seen foveally unless they say otherwise: not of spots, edges or text.
+//! Each module says what its function ignores.
 
 mod barten89;
 mod barten99;

@@ -1,4 +1,7 @@
-//! A static contrast sensitivity function set in motion.
+//! A static contrast sensitivity function set in motion by the ratios of Daly's spatiovelocity function (1998).
+//!
+//! For patterns that cross the retina as a whole. Not for flicker in place ([`super::CastleTemporal`]) nor for noise
+//! that is new in every frame ([`super::FreshNoise`]).
 
 use super::{ContrastSensitivity, Daly98};
 

@@ -1,4 +1,6 @@
 //! The guide: a quickly denoised picture from which adaptation and masking are taken. It is never shown.
+//!
+//! Not for a picture that is to be kept: what is far above all around it is brought down, and that light is lost.
 
 mod filter;
 mod fireflies;

@@ -1,4 +1,7 @@
-//! The default.
+//! The default model: octave bands under a contrast sensitivity function, each masked by its own contrast.
+//!
+//! For white noise of pixels in a still, and, given a velocity, for error that travels with what it lies on. Give no
+//! velocity for noise that is new in every frame, of which motion hides nothing.
 
 use super::{ModelInputs, ThresholdModel};
 use crate::error::Error;

@@ -2,6 +2,9 @@
 //!
 //! All answer the same question, in the same unit: the standard error of a pixel's mean, in cd/m² on the display, at
 //! which its noise is just at threshold. They differ in what they take into account.
+//!
+//! What they allow is noise. Not for bias, which all samples share and no standard error holds, as a denoiser leaves it
+//! ([`crate::denoised`]).
 
 mod ablation;
 mod bolin_meyer;

@@ -1,4 +1,7 @@
-//! Threshold versus intensity alone.
+//! Threshold versus intensity alone, by Ward Larson, Rushmeier and Piatko's curve (1997).
+//!
+//! For comparison. Not for noise of pixels: it is about large spots, in daylight 7 to 9 times too lenient unless
+//! lowered, and knows neither resolution nor texture nor motion.
 
 use super::{ModelInputs, PerLuminance, ThresholdModel, Z_95};
 use crate::adaptation::adapted;

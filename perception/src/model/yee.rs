@@ -1,4 +1,7 @@
-//! Yee, Pattanaik and Greenberg.
+//! Yee, Pattanaik and Greenberg's Aleph map of 2001: a threshold of luminance raised by motion over the retina.
+//!
+//! For error that travels with what it lies on, in comparison with the literature. Not for noise that is new in every
+//! frame, of which motion hides nothing, nor where texture should mask: it has no masking.
 
 use super::pyramid::{BANDS, band_frequency_cpd, contrast_weighted};
 use super::{ModelInputs, PerLuminance, ThresholdModel};

@@ -1,4 +1,7 @@
 //! Fine detail that an eye in dim light does not resolve, taken out of the picture for one in front of a bright display.
+//!
+//! By Shlaer's data in Ward Larson, Rushmeier and Piatko's fit (1997), for one adaptation luminance. Not for views
+//! whose parts are adapted to by themselves: the blur is one for all.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,7 @@
-//! AgX.
+//! AgX, Troy Sobotka's film-like operator as Blender 4 ships it.
+//!
+//! For pictures that are to look filmed. Not for what an eye would see: it knows neither adaptation nor the display's
+//! luminance, and bends each channel by itself, so that what becomes of luminance depends on the colour.
 
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;

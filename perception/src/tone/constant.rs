@@ -1,4 +1,7 @@
-//! One exposure for the whole picture.
+//! One exposure for the whole picture, as a camera has it.
+//!
+//! For pictures that a camera might have taken, in which ratios of light are kept. Not for scenes of more range than
+//! the display's, whose lights or shadows are lost, and not for what an eye would see: adaptation is ignored.
 
 use super::scale::Scale;
 use super::statistics::SceneStatistics;

@@ -1,4 +1,7 @@
-//! Durand and Dorsey's interactive operator.
+//! Durand and Dorsey's interactive operator, 2000: rods and cones that adapt over time.
+//!
+//! For walks through dim scenes. Not as a reference of the paper: its text could not be had, and its chromatic
+//! adaptation and flare are left out.
 
 use super::duplex::{DuplexLaw, FittedDuplex, RodWeight, adapted};
 use super::field::{AdaptationScope, LocalAdaptation};

@@ -1,4 +1,7 @@
-//! Ferwerda, Pattanaik, Shirley and Greenberg's operator of rods and cones.
+//! Ferwerda, Pattanaik, Shirley and Greenberg's operator of rods and cones, 1996.
+//!
+//! For dim scenes and what is just visible in them. Not for scenes of more range than the display's: light is scaled,
+//! and what is too bright is clipped. Acuity is that of the whole view.
 
 use super::acuity::AcuityFilter;
 use super::duplex::{DuplexLaw, FittedDuplex, RodWeight, adapted};

@@ -1,4 +1,7 @@
-//! Pattanaik, Tumblin, Yee and Greenberg's time-dependent visual model.
+//! Pattanaik, Tumblin, Yee and Greenberg's time-dependent visual model, 2000.
+//!
+//! For eyes that come from the dark or from the light, with a state of adaptation. Not for detail that dim light hides,
+//! which it shows: no acuity is lost. Without a state the eye is adapted to the picture.
 
 use std::sync::LazyLock;
 

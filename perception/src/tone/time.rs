@@ -1,6 +1,9 @@
 //! Eyes that adapt over time: neural adaptation and bleaching of cones and rods, carried from frame to frame.
 //!
 //! There is one state a view. It belongs to the eye and not to what is seen, so it is never reprojected with surfaces.
+//!
+//! After Pattanaik, Tumblin, Yee and Greenberg 2000. Not for the pupil's size or for chromatic adaptation, which are
+//! left out.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,7 @@
-//! Tumblin and Rushmeier's brightness-preserving operator.
+//! Tumblin and Rushmeier's brightness-preserving operator, 1993.
+//!
+//! For daylight and lamplight as bright as they seem. Not for thresholds, which it does not keep, and not for night:
+//! the law's exponent would turn negative, so adaptation is held at 0.001 cd/m².
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,7 @@
 //! Glare: light that bright places scatter over the whole retina.
+//!
+//! As `pcond` has it after Ward Larson, Rushmeier and Piatko 1997, for what is shown of glare. Not for thresholds,
+//! whose glare is [`crate::glare`], nor for detail within a cell of 1°.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,7 @@
-//! Ward Larson, Rushmeier and Piatko's histogram adjustment, with the human options of Radiance's `pcond`.
+//! Ward Larson, Rushmeier and Piatko's histogram adjustment of 1997, with the human options of Radiance's `pcond`.
+//!
+//! For single pictures of great range. Not for sequences: the histogram is each picture's own, and nothing is adapted
+//! over time.
 
 use serde::{Deserialize, Serialize};
 
