@@ -108,7 +108,8 @@ pub fn eccentricity_deg(width: usize, height: usize, gaze: Gaze, density: PixelD
 struct EnergyTable(UniformTable);
 
 impl EnergyTable {
-    /// For noise of which `energy_at(freq_cpd)` of its visible energy lies at each frequency of the pixel grid.
+    /// The table for noise of which `energy_at(freq_cpd)` of its visible energy lies at each frequency of the pixel
+    /// grid.
     fn new(channel: Channel, density: PixelDensity, energy_at: impl Fn(f64) -> f64) -> Self {
         let mut rings = Vec::with_capacity(RINGS);
         for_each_ring(density, RINGS, |freq_cpd, weight| rings.push((freq_cpd, weight * energy_at(freq_cpd))));

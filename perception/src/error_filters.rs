@@ -30,9 +30,9 @@ pub(crate) struct ErrorFilters<'a> {
 /// What is taken to lie around an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Surround {
-    /// Its mirror image.
+    /// The error's mirror image.
     Mirror,
-    /// Of its mirror image what changes slowly.
+    /// What changes slowly of the error's mirror image.
     SmoothMirror,
 }
 
@@ -40,7 +40,7 @@ enum Surround {
 pub(crate) struct BandResponse {
     pub(crate) amplitude: Plane,
     factor: usize,
-    /// Of the field that [`ErrorFilters`] look at, pixels.
+    /// Columns and rows of the field that [`ErrorFilters`] look at.
     width: usize,
     height: usize,
 }
@@ -70,14 +70,15 @@ fn compressed(error: f32, adaptation: f32) -> f32 {
 }
 
 impl<'a> ErrorFilters<'a> {
-    /// For errors that go on beyond the picture as they are in it, such as noise: mirrored. The field that responses are given for is
-    /// the picture.
+    /// Filters for errors that go on beyond the picture as they are in it, such as noise: mirrored. The field that
+    /// responses are given for is the picture.
     pub(crate) fn new(map: &'a ThresholdMap) -> Self {
         Self::with_surround(map, Surround::Mirror)
     }
 
-    /// For differences of two pictures that have nothing different around them. The field that responses are given for is the picture
-    /// and as much around it as the pooling window reaches over: what an error at the border does to the eye, it does on both sides.
+    /// Filters for differences of two pictures that have nothing different around them. The field that responses are
+    /// given for is the picture and as much around it as the pooling window reaches over: what an error at the border
+    /// does to the eye, it does on both sides.
     ///
     /// What changes slowly, the difference through a Gaussian of 1°, is mirrored all the same. With nothing at all outside, a picture
     /// that is brighter as a whole would have an edge where it ends, which nobody sees: the display's surround is there, not a picture

@@ -68,7 +68,7 @@ pub(crate) struct MaskSource<'a> {
     /// Coordinates of the adaptation luminance in the tables, at every second pixel.
     pub(crate) coordinates: &'a Plane,
     pub(crate) density: PixelDensity,
-    /// Of the picture, pixels.
+    /// Columns and rows of the picture.
     pub(crate) width: usize,
     pub(crate) height: usize,
 }
@@ -134,9 +134,9 @@ fn mask_gain(source: &MaskSource<'_>, bands: &OctaveBands, band: usize) -> Radia
 
 /// Where a band's masks are known.
 struct BandGrid {
-    /// Of the energy and what comes of it.
+    /// Where samples of the energy and of what comes of it stand.
     frame: Frame,
-    /// Of the amplitude, twice as densely.
+    /// Where samples of the amplitude stand, twice as densely.
     amplitude_frame: Frame,
     /// The wavelength of the band's centre along x and y, in samples of `frame`.
     wavelengths: [f64; 2],

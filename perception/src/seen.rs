@@ -140,7 +140,7 @@ pub struct SceneColour {
 /// Noise behind an operator and a display: [`display_opponent_variances`] for those who have it pixel by pixel.
 pub struct NoiseShown<'a> {
     shown: Shown<'a>,
-    /// Of tints on black.
+    /// Room of tints on black, red–green and yellow–violet.
     rooms_cd_m2: [f64; 2],
 }
 
@@ -260,7 +260,7 @@ mod tests {
         operator("absolute", None).unwrap().fit(&SceneGuide::of(&guide), &viewing, None)
     }
 
-    /// Of red and green, where luminance has no noise.
+    /// Variance of red–green as displayed, where luminance has no noise.
     fn chromatic_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
         let slope = display_chromatic_slope(fitted, display, mean);
         let grey = SceneColours { rgb: &[[1.0; 3]], chromatic_slope: &slope };
@@ -402,7 +402,7 @@ mod tests {
     fn noise_of_luminance_pales_colours() {
         let display = Display::default();
         let fitted = absolute(&display);
-        // What is squeezed already has some of its noise told that is hidden: at most twice and a half.
+        // Of what is squeezed already some noise is predicted that is hidden: at most twice and a half.
         for (colour, mean, deviation, most) in [
             ([0.6, 0.06, 0.05], 30.0, 2.0, 1.05),
             ([0.6, 0.06, 0.05], 110.0, 8.0, 2.5),
@@ -504,7 +504,7 @@ mod tests {
             for signal in 0..3 {
                 let truth = (squares[signal] / weights - (sums[signal] / weights).powi(2)).sqrt();
                 let told = f64::from(told[signal].get(0, 0)).sqrt();
-                // What tints do to luminance, and to each other, is not told.
+                // What tints do to luminance, and to each other, is not predicted.
                 let is_of_tint = matches!(noise, NoiseOf::Tint(_)) && signal != 1;
                 // Where one channel is clipped now and then three points are up to 0.27 off.
                 let is_right = (told / truth.max(1e-3) - 1.0).abs() < 0.3 || truth.max(told) < 0.02;

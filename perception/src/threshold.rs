@@ -56,7 +56,7 @@ pub enum GuideNoise<V> {
 }
 
 impl<V> GuideNoise<V> {
-    /// The same of another form of the variance.
+    /// What is known of the same noise, with another form of its variance.
     pub(crate) fn map<W>(self, change: impl FnOnce(V) -> W) -> GuideNoise<W> {
         match self {
             Self::Clean => GuideNoise::Clean,

@@ -69,7 +69,7 @@ pub(super) struct Energies {
 }
 
 impl Energies {
-    /// Of channels of these spatial sensitivities, together.
+    /// Energy that both channels together receive, of these spatial sensitivities.
     pub(super) fn seen_by(self, sustained: f64, transient: f64) -> f64 {
         self.sustained * sustained * sustained
             + 2.0 * self.mixed * sustained * transient

@@ -93,13 +93,14 @@ impl FrameResponses {
         self.reach
     }
 
-    /// The same where only so many frames are before the one that is shown and so many after it: those that nobody has are expected to go on
-    /// as the others do, in what stands still and in what changes from frame to frame and back, and leave them what they weigh in both. What
-    /// stands still is then seen as in a still, flicker of every other frame as amid others, slower flicker on 100 cd/m² at 24 to 60 frames a
-    /// second 0.73 to 1.18 as well (in dim light or colours, where next to nothing is seen amid others, several times that), and noise that is
-    /// new in every frame nearly as amid others: the sustained channel holds 1.05 of it at 24 frames a second and at 60. *Turned down:* the mean
-    /// alone (the first frame of a flicker of ±5 % at 30 Hz has 3.2 times the visibility of those within); ends that
-    /// stand still (1.46 and 1.89 of noise); frames that come again as in a mirror (1.15 and 1.30).
+    /// These responses where only so many frames are before the one that is shown and so many after it: those that
+    /// nobody has are expected to go on as the others do, in what stands still and in what changes from frame to frame
+    /// and back, and leave them what they weigh in both. What stands still is then seen as in a still, flicker of every
+    /// other frame as amid others, slower flicker on 100 cd/m² at 24 to 60 frames a second 0.73 to 1.18 as well (in dim
+    /// light or colours, where next to nothing is seen amid others, several times that), and noise that is new in every
+    /// frame nearly as amid others: the sustained channel holds 1.05 of it at 24 frames a second and at 60. *Turned
+    /// down:* the mean alone (the first frame of a flicker of ±5 % at 30 Hz has 3.2 times the visibility of those
+    /// within); ends that stand still (1.46 and 1.89 of noise); frames that come again as in a mirror (1.15 and 1.30).
     pub(crate) fn within(&self, earlier: usize, later: usize) -> Self {
         let there = self.reach.saturating_sub(earlier)..=self.reach + later.min(self.reach);
         let of = |weights: &Weights| shared(weights, &there);
@@ -156,12 +157,12 @@ struct Moment {
     timing: FrameTiming,
     hz_step: f64,
     hz: Vec<f64>,
-    /// Of each frame, by frequency.
+    /// Waves of each frame, by frequency.
     waves: Vec<Vec<f64>>,
 }
 
 impl Moment {
-    /// So long after the middle of the frame that is shown.
+    /// The moment `moment_s` seconds after the middle of the frame that is shown.
     fn new(timing: FrameTiming, moment_s: f64) -> Self {
         let hz_step = timing.hz_step();
         let hz: Vec<f64> = (0..(HIGHEST_HZ / hz_step) as usize).map(|step| (step as f64 + 0.5) * hz_step).collect();

@@ -126,7 +126,7 @@ type Made = Box<dyn ContrastSensitivity>;
 
 /// How a function is made.
 enum Constructor {
-    /// By itself.
+    /// Without asking for whom.
     Plain(fn() -> Made),
     /// For gratings of an area, deg², and for the display's distance where it depends on that.
     OfArea(fn(area_deg2: f64, &Viewing) -> Result<Made, Error>),

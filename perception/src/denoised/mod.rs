@@ -152,7 +152,7 @@ impl DenoisedError {
         self.clone().scaled(|plane| plane.combined(factors, |value, factor| value / factor))
     }
 
-    /// The same error seen as many times as well as `scale` makes of a visibility.
+    /// This error seen as many times as well as `scale` makes of a visibility.
     fn scaled(mut self, scale: impl Fn(&Plane) -> Plane) -> Self {
         for plane in [&mut self.visibility, &mut self.variance, &mut self.bias] {
             *plane = scale(plane);

@@ -10,7 +10,7 @@ use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
 /// error 1.00 to 1.18 times what the halves' difference shows (by a run of `fechner bench --suite denoise` whose table
 /// is not kept).
 const USUAL_FACTOR: f64 = 0.2;
-/// Its standard deviation between pictures.
+/// Standard deviation of the factor between pictures.
 const FACTOR_DEVIATION: f64 = 0.4;
 /// Standard errors above what the factor says from which a place's own witness begins to count, and from which it counts alone.
 /// Far out, since products of two normal values have long tails. Measured at 3 and 5: raw noise of visibility 20 alone
@@ -25,13 +25,13 @@ const NORMAL_KURTOSIS: f32 = 3.0;
 
 /// Pooled energies of one band, squared threshold units.
 pub(super) struct BandEvidence {
-    /// Of the denoised halves' difference.
+    /// Energy of the denoised halves' difference.
     pub(super) variance: Plane,
-    /// Of the residual, less what noise puts into it: unbiased for the bias's, may be negative.
+    /// Energy of the residual, less what noise puts into it: unbiased for the bias's, may be negative.
     pub(super) witness: Plane,
     /// Variance of `witness` from the raw noise.
     pub(super) witness_variance: Plane,
-    /// Of the noise in the residual, which is nearly the raw mean's.
+    /// Energy of the noise in the residual, which is nearly the raw mean's.
     pub(super) raw_noise: Plane,
     /// Pixels that the pooling window holds: neighbours within it are no independent witnesses.
     window_pixels: f64,

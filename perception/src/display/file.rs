@@ -29,11 +29,11 @@ struct DisplayFile {
 
 /// How a file says how many pixels a degree has.
 enum Density {
-    /// As its preset has it.
+    /// As the file's preset has it.
     Preset,
-    /// By the number.
+    /// By the number of pixels a degree itself.
     Stated(f64),
-    /// By the screen's geometry.
+    /// By the screen's width and distance.
     Follows { width_px: f64, width_m: f64, distance_m: f64 },
 }
 

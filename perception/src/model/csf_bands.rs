@@ -44,7 +44,7 @@ pub(super) fn still(inputs: &ModelInputs<'_>) -> Result<ThresholdMap, Error> {
     threshold_map(&guide, inputs.viewing, inputs.csf)
 }
 
-/// The same, or that of what moves where a velocity is given.
+/// The threshold map of a still, or of what moves where a velocity is given.
 pub(super) fn still_or_moving(inputs: &ModelInputs<'_>) -> Result<ThresholdMap, Error> {
     let map = still(inputs)?;
     match inputs.retinal_velocity_deg_s() {

@@ -56,8 +56,8 @@ impl Shown<'_> {
         NoisyPixel { shown: self, pixel, noise, hue: None, points }
     }
 
-    /// The same of a colour, `hue` at a luminance of 1 cd/m², that the operator shows as something else than a grey of its luminance; and what
-    /// its three points show.
+    /// A pixel with noisy light of a colour, `hue` at a luminance of 1 cd/m², that the operator shows as something else
+    /// than a grey of its luminance; and what its three points show.
     pub(super) fn coloured_pixel(
         &self,
         pixel: Pixel,
@@ -86,9 +86,9 @@ impl Shown<'_> {
 /// A pixel's scene luminance.
 #[derive(Clone, Copy)]
 pub(super) struct Noise {
-    /// cd/m², at least 0.
+    /// Mean of the light, cd/m², at least 0.
     pub(super) mean: f64,
-    /// Of the mean, (cd/m²)², at least 0.
+    /// Variance of that mean, (cd/m²)², at least 0.
     pub(super) variance: f64,
 }
 

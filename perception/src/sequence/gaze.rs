@@ -77,7 +77,7 @@ const MOST_TAPS: f32 = 64.0;
 /// Pixels from a pixel's centre to its border.
 const WITHIN_PIXEL: f32 = 0.5;
 
-/// For half a smear of so many pixels.
+/// Places that half a smear of `length` pixels is summed over.
 fn taps(length: f32) -> f32 {
     if length <= WITHIN_PIXEL { 1.0 } else { (LEAST_TAPS + TAPS_A_PIXEL * length).min(MOST_TAPS).ceil() }
 }

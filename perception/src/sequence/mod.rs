@@ -92,7 +92,7 @@ struct Light {
 #[derive(Clone, Copy, Default)]
 struct Seen {
     sustained: [f32; 3],
-    /// Of luminance, in the transient channel.
+    /// Difference of luminance in the transient channel.
     transient: f32,
 }
 
@@ -323,7 +323,7 @@ impl<'a> Filters<'a> {
         raise(greatest, &visibility);
     }
 
-    /// The same for colours.
+    /// Raises a visibility to that of colours at one moment where it is greater.
     fn add_chromatic(&mut self, greatest: &mut Plane, seen: &SeenPlanes) {
         let [_, red_green, yellow_violet] = &seen.sustained;
         raise(greatest, &self.red_green.visibility(red_green));

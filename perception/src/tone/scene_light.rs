@@ -9,7 +9,7 @@ use crate::plane::Plane;
 pub struct SceneLight {
     photopic_cd_m2: Plane,
     scotopic_cd_m2: Option<Plane>,
-    /// The same of what covers each pixel, where that is not all of all.
+    /// Light of what covers each pixel, where not all are covered whole.
     covering: Option<Covering>,
 }
 

@@ -19,7 +19,7 @@ const DARKEST_SHARE: f32 = 1e-6;
 /// Share of the picture's pixels that are too few to make all others darkness: fireflies, the disc of the sun. More of them, 20 stops
 /// above everything else, hold 99.9 % of the light and are what there is to see.
 const TOO_FEW: f64 = 1e-3;
-/// The same in pixels, for small pictures: a firefly, or a pair with its neighbours.
+/// Pixels of a small picture that are too few in any case: a firefly, or a pair with its neighbours.
 const TOO_FEW_PIXELS: usize = 4;
 
 /// What an eye makes of a pixel: less than the floor of vision is as dark as the floor. `None` for what is no light.

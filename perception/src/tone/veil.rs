@@ -25,7 +25,7 @@ const MOST_CELLS: usize = 2500;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Veil {
     cell: CellSize,
-    /// Of each cell, already times the share.
+    /// Veil in the middle of each cell, cd/m², already times the share.
     cells_cd_m2: FrozenPlane,
     mean_cd_m2: f32,
 }
