@@ -1,4 +1,8 @@
 //! What the eye is adapted to.
+//!
+//! The mean luminance over a Gaussian as wide as a disc of 1°, at which thresholds are taken. Not for the course of
+//! adaptation over time ([`crate::tone::AdaptationState`]), and not for noisy pictures as they are: of noise only lone
+//! fireflies and pairs are brought down, so give a denoised guide.
 
 use crate::display::{Display, Viewing};
 use crate::error::Error;
@@ -11,7 +15,7 @@ use crate::threshold::POOLING_SIGMA_DEG;
 /// How luminances are averaged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mean {
-    /// What reaches the retina; what threshold curves were measured with. A firefly moves it.
+    /// The arithmetic mean: what reaches the retina, and what threshold curves were measured with. A firefly moves it.
     #[default]
     Arithmetic,
     /// exp(mean(ln L)): robust, usual for the key of a whole picture.

@@ -5,6 +5,9 @@
 //! nᵢ = √(wᵢ μᵢ / cᵢ), w = 2 N σ², clamped: Neyman's allocation, weighted by what the eye pools. Multipliers grow where the
 //! constraint is violated and fade where it is slack; by weak duality any of them bounds the cheapest cost from below,
 //! which is the certificate every [`Allocation`] carries.
+//!
+//! For noise that is independent from pixel to pixel and whose variance falls as 1/n. Not for bias, which no count
+//! brings down, nor for masks that change while samples come: thresholds are taken as given.
 
 mod block_grid;
 mod solver;
@@ -19,7 +22,7 @@ use solver::Solver;
 pub struct AllocationProblem<'a> {
     /// Variance of one sample, (cd/m²)² on the display.
     pub variance_per_sample: &'a Plane,
-    /// What can be seen.
+    /// What can be seen of the picture that is sampled.
     pub thresholds: &'a ThresholdMap,
     /// Cost of one sample, in any unit (rays and node visits, not seconds); positive.
     pub cost: &'a Plane,
@@ -28,7 +31,7 @@ pub struct AllocationProblem<'a> {
     /// by: behind one from 4 to 0.25 [`ThresholdMap::predicted_visibility`] is up to 1.13 times what is asked for at 4 pixels a degree, 1.04
     /// at 10 to 38, 1.02 from 60 on, though every constraint here is met; behind one from 2 to 0.5 1.03 and 1.01.
     pub tolerance: Option<&'a Plane>,
-    /// Visibility v\* that may remain.
+    /// Visibility v\* that may remain, in threshold units.
     pub visibility: f64,
     /// Fewest samples a pixel gets; at least 1e-6.
     pub min_samples: f64,
@@ -50,11 +53,11 @@ const LEAST_STEP: f64 = 0.25;
 pub struct Allocation {
     /// Total samples of each pixel, real-valued.
     pub samples: Plane,
-    /// Σ cᵢ nᵢ.
+    /// What these counts cost, Σ cᵢ nᵢ, in the unit of [`AllocationProblem::cost`].
     pub cost: f64,
     /// No counts within the limits that meet the constraints cost less than this.
     pub lower_bound: f64,
-    /// `cost / lower_bound − 1`.
+    /// Share by which the counts cost more than the cheapest at most: `cost / lower_bound − 1`, not below 0.
     pub gap: f64,
     /// The visibility that was asked for. For a fixed budget: the greatest that the counts leave anywhere, over what is tolerated
     /// there, be it because `max_samples` does not reach further.
@@ -62,7 +65,8 @@ pub struct Allocation {
     /// Pixels whose visibility stays above what was asked for even with `max_samples` everywhere. Their constraints are
     /// relaxed to what can be reached (plus 1 % of v²).
     pub unreachable_pixels: usize,
-    /// Updates of the multipliers.
+    /// How many times the multipliers were updated for these counts; of a fixed budget, in the round that they come
+    /// from.
     pub iterations: usize,
 }
 

@@ -52,8 +52,9 @@ impl OctaveBands {
     /// Amplitude gain of `band` for the guide: closed at the bottom, so that a slow gradient is no mask.
     ///
     /// From its centre on the open last band counts contrast by the eye's `sensitivity` (any scale) there and not at its centre: what
-    /// cannot be seen is no mask. Without it stripes of 100 cpd and a tenth of their threshold raised that of 16 cpd threefold,
-    /// and on 38 pixels a degree a grating of 18 cpd at half its threshold that of 8 cpd by 1.39 (Daly's formula: 1.03).
+    /// cannot be seen is no mask. Measured without it: stripes of 100 cpd at a tenth of their threshold raise that of
+    /// 16 cpd threefold, and on 38 pixels a degree a grating of 18 cpd at half its threshold raises that of 8 cpd by
+    /// 1.39 (Daly's formula: 1.03).
     pub(crate) fn mask_gain(&self, band: usize, freq_cpd: f64, sensitivity: impl Fn(f64) -> f64) -> f64 {
         if freq_cpd <= 0.0 {
             return 0.0;

@@ -1,4 +1,9 @@
 //! Visibility of colour errors: over the achromatic, red–green and yellow–violet channels the largest counts.
+//!
+//! Through castleCSF's achromatic and chromatic mechanisms (Ashraf et al. 2024). Each channel is masked by its own
+//! contrast alone, and visibilities of channels do not add. Not for thresholds of fine red–green patterns: the
+//! function's fall there is an extrapolation beyond its data, by which fine red–green noise counts for more than it
+//! should.
 
 use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel, ContrastSensitivity, FrameTiming};
 use crate::display::Viewing;
@@ -16,11 +21,11 @@ use crate::tone::acuity::{AcuityFilter, BehindAcuity};
 /// Thresholds of one picture in each of the eye's three channels.
 #[derive(Clone, Debug)]
 pub struct ColourThresholds {
-    /// Luminance.
+    /// Thresholds of errors of luminance.
     pub achromatic: ThresholdMap,
-    /// L − M.
+    /// Thresholds of errors of the red–green signal, L − M.
     pub red_green: ThresholdMap,
-    /// S − (L + M).
+    /// Thresholds of errors of the yellow–violet signal, S − (L + M).
     pub yellow_violet: ThresholdMap,
 }
 
@@ -129,7 +134,7 @@ impl ThresholdMap {
         Ok(self.seen_from_gaze(gain, channel, |freq_cpd| csf.sensitivity(freq_cpd, grey_cd_m2)))
     }
 
-    /// Gains of both chromatic channels.
+    /// Noise gains N(x) of both chromatic channels, 1/(cd/m²)²: [`Self::chromatic_noise_gain`] of each.
     ///
     /// # Errors
     /// As [`CastleChromatic::new`].
@@ -141,7 +146,7 @@ impl ThresholdMap {
         Ok(ChromaticGains { red_green: red_green?, yellow_violet: yellow_violet? })
     }
 
-    /// Gains of both chromatic channels for noise that is new in every frame.
+    /// Noise gains N(x) of both chromatic channels, 1/(cd/m²)², for noise that is new in every frame.
     ///
     /// # Errors
     /// As [`CastleChromatic::new`], and for an impossible timing.
@@ -178,9 +183,9 @@ impl ThresholdMap {
 /// N(x) of the chromatic channels, 1/(cd/m²)²: see [`ThresholdMap::chromatic_noise_gain`].
 #[derive(Clone, Debug)]
 pub struct ChromaticGains {
-    /// Of L − M.
+    /// N(x) of the red–green signal, L − M.
     pub red_green: Plane,
-    /// Of S − (L + M).
+    /// N(x) of the yellow–violet signal, S − (L + M).
     pub yellow_violet: Plane,
 }
 
@@ -238,7 +243,8 @@ mod tests {
         assert!(night.is_some() && of_colour(night) < 0.9 * seen, "{} of {seen}", of_colour(night));
     }
 
-    /// The mean of two halves: its own noise hid most of what it was judged by.
+    /// A picture that is the mean of two noisy halves. Regression: its own noise masked most of the noise that it is
+    /// judged by.
     #[test]
     fn noise_of_colour_does_not_hide_itself() {
         let error = noise(|value| red_for_green(40.0 * value));

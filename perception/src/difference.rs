@@ -1,4 +1,8 @@
 //! A visible-differences predictor: can one picture be told from another?
+//!
+//! After Daly 1993, for two stills that lie pixel on pixel: a shift by a pixel is a difference as any other. Not for
+//! moving pictures ([`crate::sequence`]), and not for how good a picture is: it says whether a difference is seen, and
+//! its scale is thresholds.
 
 use crate::colour::Channels;
 use crate::csf::{CastleChromatic, ChromaticChannel, ContrastSensitivity};
@@ -21,11 +25,9 @@ pub struct Difference {
 
 impl Difference {
     pub(crate) fn of(visibility: Plane) -> Self {
-        let worst = visibility.values().iter().copied().fold(0.0, f32::max);
-        let visible = visibility.values().iter().filter(|v| **v > 1.0).count();
         Self {
-            worst_visibility: f64::from(worst),
-            visible_fraction: visible as f64 / visibility.values().len() as f64,
+            worst_visibility: f64::from(visibility.max()),
+            visible_fraction: visibility.share_above(1.0),
             visibility,
         }
     }

@@ -1,4 +1,7 @@
 //! The display, and who looks at it from where.
+//!
+//! A display is as fine to the eye everywhere as at its centre. Not for flat screens that fill the view: pixels are
+//! finer to the eye towards their rim.
 
 mod file;
 
@@ -14,7 +17,7 @@ pub use crate::viewing::{Glare, Observer, Viewing};
 /// A display at its viewing distance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Display {
-    /// What a report calls it.
+    /// The display's name in reports.
     pub name: String,
     /// Pixels a degree of visual angle along a row, at the centre: 2 d tan(0.5°) / pixel pitch.
     pub pixels_per_degree: f64,
@@ -28,13 +31,13 @@ pub struct Display {
     pub black_cd_m2: f64,
     /// Room light reflected by the screen, cd/m², added to everything it shows.
     pub ambient_cd_m2: f64,
-    /// Transfer function.
+    /// Transfer function between code values and light.
     pub eotf: Eotf,
     /// Viewing distance in metres, where known: some contrast sensitivity functions depend on it.
     pub distance_m: Option<f64>,
     /// Contrast sensitivity area this display asks for, deg²; `None` leaves the observer's.
     pub csf_area_deg2: Option<f64>,
-    /// Frames a second, for moving pictures.
+    /// New frames a second that the display shows of a moving picture.
     pub frames_per_second: f64,
     /// Share of a frame's time that a pixel is lit: 1 for sample-and-hold, towards 0 for a strobed display.
     pub persistence: f64,
@@ -86,7 +89,8 @@ impl Default for Display {
 }
 
 impl Display {
-    /// A display everybody has a name for; see [`Display::preset_names`].
+    /// The preset of that name, a display that everybody has a name for; `None` where there is none; see
+    /// [`Display::preset_names`].
     ///
     /// ```
     /// use fechner_perception::Display;
@@ -98,7 +102,7 @@ impl Display {
         PRESETS.iter().find(|preset| preset.name == name).map(Self::from_preset)
     }
 
-    /// [`Display::preset`], for names that somebody has given.
+    /// The preset of a name that somebody has given: [`Display::preset`], with an error instead of `None`.
     ///
     /// # Errors
     /// [`Error::UnknownName`], which lists those that there are.
@@ -154,7 +158,8 @@ impl Display {
         self.emitted_cd_m2(relative) + self.ambient_cd_m2
     }
 
-    /// The part of it that is the display's own light: without what the screen reflects of the room's.
+    /// Luminance, cd/m², that this display itself emits for linear light `relative` (clamped to 0..1; NaN counts as 0):
+    /// [`Display::luminance_cd_m2`] without what the screen reflects of the room's light.
     #[must_use]
     pub fn emitted_cd_m2(&self, relative: f64) -> f64 {
         let light = if relative.is_nan() { 0.0 } else { relative.clamp(0.0, 1.0) };
@@ -189,14 +194,14 @@ impl Display {
         }
     }
 
-    /// The inverse of [`Display::emitted_cd_m2`]: what linear display RGB is emitted as so many cd/m², 0 at black and 1 at white, beyond
-    /// them where the display cannot reach it.
+    /// Linear display light that is emitted as `cd_m2` cd/m²: the inverse of [`Display::emitted_cd_m2`], 0 at black and
+    /// 1 at white, beyond them where the display cannot reach it.
     #[must_use]
     pub fn relative_of_emitted(&self, cd_m2: f64) -> f64 {
         (cd_m2 - self.black_cd_m2) / (self.white_cd_m2 - self.black_cd_m2).max(1e-6)
     }
 
-    /// Rejects a display that cannot be.
+    /// Rejects a display with a field outside its range.
     ///
     /// # Errors
     /// [`Error::OutOfRange`], naming the field.
@@ -270,7 +275,8 @@ mod tests {
         assert!((display.luminance_cd_m2(7.0) - 201.0).abs() < 1e-9);
     }
 
-    /// BT.1886 lifts its curve by the display's black: code 0.05 was 0.28 cd/m² on a television that has 0.61.
+    /// BT.1886 lifts its curve by the display's black. Regression: code 0.05 came out as 0.28 cd/m² on a television
+    /// that shows 0.61.
     #[test]
     fn codes_are_shown_from_black_to_white() {
         for name in Display::preset_names() {

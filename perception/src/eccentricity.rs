@@ -21,9 +21,9 @@ use serde::{Deserialize, Serialize};
 /// A place in the picture that is looked at, pixels from its upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gaze {
-    /// To the right.
+    /// Pixels from the picture's left edge.
     pub x_px: f64,
-    /// Down.
+    /// Pixels from the picture's upper edge.
     pub y_px: f64,
 }
 
@@ -35,12 +35,12 @@ impl Gaze {
     }
 }
 
-/// The eye's three channels.
+/// The eye's three channels, of which each loses sensitivity away from the gaze by a law of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// Luminance.
+    /// The channel of luminance.
     Achromatic,
-    /// L − M or S − (L + M).
+    /// One of the two opponent channels, L − M or S − (L + M).
     Chromatic(ChromaticChannel),
 }
 
@@ -147,7 +147,8 @@ impl FlatDisplay {
 struct EnergyTable(UniformTable);
 
 impl EnergyTable {
-    /// For noise of which `energy_at(freq_cpd)` of its visible energy lies at each frequency of the pixel grid.
+    /// The table for noise of which `energy_at(freq_cpd)` of its visible energy lies at each frequency of the pixel
+    /// grid.
     fn new(channel: Channel, density: PixelDensity, energy_at: impl Fn(f64) -> f64) -> Self {
         let mut rings = Vec::with_capacity(RINGS);
         for_each_ring(density, RINGS, |freq_cpd, weight| rings.push((freq_cpd, weight * energy_at(freq_cpd))));
@@ -166,7 +167,8 @@ impl EnergyTable {
 }
 
 impl ThresholdMap {
-    /// The same thresholds for eyes that look at `gazes`, of which the nearest counts at every pixel; without any, nothing changes.
+    /// Thresholds of this picture for eyes that look at `gazes`, of which the nearest counts at every pixel; without
+    /// any, nothing changes.
     ///
     /// Each band's threshold is raised by the root of what is left of the energy that white noise has in it, at the middle one of
     /// the picture's adaptation levels: the fall within a band is steep, and its centre alone would promise too much.

@@ -1,4 +1,7 @@
 //! Electro-optical transfer functions: between the number in a file and the light of a display.
+//!
+//! For numbers in files. Not for judging light, which is in cd/m² everywhere else
+//! ([`crate::Display::luminance_cd_m2`]).
 
 use serde::{Deserialize, Serialize};
 

@@ -75,7 +75,7 @@ pub enum Error {
     Parse {
         /// Which file or text.
         what: &'static str,
-        /// Its line that is wrong, from 1, where it is one.
+        /// The line that is wrong, from 1, where it is one.
         line: Option<usize>,
         /// What is wrong with it.
         reason: String,
@@ -83,7 +83,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// That nothing of a kind has this name.
+    /// The error that nothing of a kind has this name.
     pub(crate) fn unknown_name(kind: &'static str, name: &str, known: &[&str]) -> Self {
         Self::UnknownName { kind, name: name.to_owned(), known: known.join(", ") }
     }

@@ -9,10 +9,11 @@ use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
 /// An error of this many times the adaptation luminance is hopelessly visible; more would only cost the rest of the
 /// transform its precision, and counts by its logarithm ([`compressed`]).
 pub(crate) const LARGEST_RELATIVE_ERROR: f32 = 1e3;
-/// Standard deviation of what counts as slow at a picture's border, degrees. 256×256 pixels at 60 a degree, v of a square of 9 and of 31
-/// pixels in a corner, half brighter: 14.40 and 25.1 amid equal pictures; mirrored 21.9 and 23.1; by a σ of 0.25° 13.3 and 20.7, of
-/// 0.5° 14.0 and 21.7, of 1° 14.3 and 23.8, of 2° 14.4 and 24.7. From 2° on gradients have edges at borders: waves of 2 % over some 5° are
-/// at 0.73, not 0.66.
+/// Standard deviation of what counts as slow at a picture's border, degrees: as wide as it may be before gradients have
+/// edges at borders, which they have from 2° on (waves of 2 % over some 5° are at 0.73, not 0.66). Measured on 256×256
+/// pixels at 60 a degree, v of a square of 9 and of 31 pixels in a corner, half brighter: amid equal pictures 14.40 and
+/// 25.1; mirrored 21.9 and 23.1; by a σ of 0.25° 13.3 and 20.7, of 0.5° 14.0 and 21.7, of 1° 14.3 and 23.8, of 2° 14.4
+/// and 24.7.
 const SURROUND_SIGMA_DEG: f64 = 1.0;
 /// How far the pooling window reaches, in its standard deviations: three boxes of about one on each side.
 const POOLING_REACH: f64 = 3.0;
@@ -29,9 +30,9 @@ pub(crate) struct ErrorFilters<'a> {
 /// What is taken to lie around an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Surround {
-    /// Its mirror image.
+    /// The error's mirror image.
     Mirror,
-    /// Of its mirror image what changes slowly.
+    /// What changes slowly of the error's mirror image.
     SmoothMirror,
 }
 
@@ -39,7 +40,7 @@ enum Surround {
 pub(crate) struct BandResponse {
     pub(crate) amplitude: Plane,
     factor: usize,
-    /// Of the field that [`ErrorFilters`] look at, pixels.
+    /// Columns and rows of the field that [`ErrorFilters`] look at.
     width: usize,
     height: usize,
 }
@@ -56,8 +57,9 @@ impl BandResponse {
     }
 }
 
-/// An error over the adaptation luminance up to [`LARGEST_RELATIVE_ERROR`], and beyond it what grows with its logarithm. Cut off there, a
-/// texture of 50 to 100 cd/m² on black was one value all over, which nobody sees: v was 0.00, and 47.6 for a tenth of it.
+/// An error over the adaptation luminance up to [`LARGEST_RELATIVE_ERROR`], and beyond it what grows with its
+/// logarithm: cut off there, a texture would be one value all over, which nobody sees. Measured on a texture of 50 to
+/// 100 cd/m² on black: cut off, v 0.00, and 47.6 for a tenth of it.
 fn compressed(error: f32, adaptation: f32) -> f32 {
     let relative = error / adaptation;
     if relative.abs() <= LARGEST_RELATIVE_ERROR {
@@ -68,14 +70,15 @@ fn compressed(error: f32, adaptation: f32) -> f32 {
 }
 
 impl<'a> ErrorFilters<'a> {
-    /// For errors that go on beyond the picture as they are in it, such as noise: mirrored. The field that responses are given for is
-    /// the picture.
+    /// Filters for errors that go on beyond the picture as they are in it, such as noise: mirrored. The field that
+    /// responses are given for is the picture.
     pub(crate) fn new(map: &'a ThresholdMap) -> Self {
         Self::with_surround(map, Surround::Mirror)
     }
 
-    /// For differences of two pictures that have nothing different around them. The field that responses are given for is the picture
-    /// and as much around it as the pooling window reaches over: what an error at the border does to the eye, it does on both sides.
+    /// Filters for differences of two pictures that have nothing different around them. The field that responses are
+    /// given for is the picture and as much around it as the pooling window reaches over: what an error at the border
+    /// does to the eye, it does on both sides.
     ///
     /// What changes slowly, the difference through a Gaussian of 1°, is mirrored all the same. With nothing at all outside, a picture
     /// that is brighter as a whole would have an edge where it ends, which nobody sees: the display's surround is there, not a picture

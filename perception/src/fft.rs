@@ -86,8 +86,8 @@ pub(crate) fn smooth_size(least: usize) -> usize {
 }
 
 impl PictureTransform {
-    /// For pictures of `width` × `height` pixels, mirrored by [`MIRROR_DEG`] on every side or by half of a shorter picture: then
-    /// nothing is nearer across the seam of the period than it is in the picture itself.
+    /// The transform for pictures of `width` × `height` pixels, mirrored by [`MIRROR_DEG`] on every side or by half of
+    /// a shorter picture: then nothing is nearer across the seam of the period than it is in the picture itself.
     pub(crate) fn new(width: usize, height: usize, density: PixelDensity) -> Self {
         let padded = |len: usize, pad: usize| MOST_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MOST_REDUCTION));
         let (pad_x, pad_y) = (mirror_px(width, density.horizontal), mirror_px(height, density.vertical));

@@ -116,6 +116,7 @@ pub mod guide;
 pub mod masking;
 pub mod model;
 pub mod motion;
+mod names;
 mod noise_gain;
 pub mod opponent;
 pub mod photometry;

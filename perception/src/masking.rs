@@ -1,4 +1,8 @@
 //! Masking: how much a band's own contrast raises its threshold.
+//!
+//! Each octave band is masked by its own contrast (Daly 1993), up to three times. Orientation is ignored: a mask hides
+//! error across it as well as along it. Not for masking between bands or channels, of which there is none here, and not
+//! of lone edges, which mask nothing beside them.
 
 use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::csf::ContrastSensitivity;
@@ -64,14 +68,16 @@ pub(crate) struct MaskSource<'a> {
     /// Coordinates of the adaptation luminance in the tables, at every second pixel.
     pub(crate) coordinates: &'a Plane,
     pub(crate) density: PixelDensity,
-    /// Of the picture, pixels.
+    /// Columns and rows of the picture.
     pub(crate) width: usize,
     pub(crate) height: usize,
 }
 
-/// Radius of the disc that erodes, in wavelengths: around the square of one wavelength to each side, whose corners clear what is beside
-/// corners of things. With a disc of one wavelength the edges of a lamp masked themselves: thresholds there rose by 4 to 12 %, and the squared
-/// error that 64 samples a pixel leave of the Cornell box, in units of thresholds, from 0.93 to 1.05 of even sampling's (now 0.96).
+/// Radius of the disc that erodes, in wavelengths: around the square of one wavelength to each side, whose corners
+/// clear what is beside corners of things. A disc of one wavelength lets the edges of a lamp mask themselves. Measured:
+/// thresholds there 4 to 12 % higher by it; and of the squared error that even sampling leaves of the Cornell box at 64
+/// samples a pixel, in units of thresholds, 0.93 is left by the square, 1.05 by the disc in it, 0.96 by the disc around
+/// it.
 const REACH_WAVELENGTHS: f64 = std::f64::consts::SQRT_2;
 
 /// Standard deviation of the window that softens the eroded elevation, in wavelengths: less than half of what the erosion takes off, so that
@@ -79,8 +85,9 @@ const REACH_WAVELENGTHS: f64 = std::f64::consts::SQRT_2;
 const EDGE_WAVELENGTHS: f64 = 0.25;
 
 /// How far around the picture its mirror image is worked on, in wavelengths, where the transform has as much of it: what the windows
-/// and the erosion reach over. Each of them mirrors what it is given, too, but at a sample and not where the picture ends: that alone
-/// made thresholds in the first and the last rows of 96×96 pixels of noise differ by 5 % from those of the mirrored picture.
+/// and the erosion reach over. Each of them mirrors what it is given, too, but at a sample and not where the picture
+/// ends. Measured with that alone on 96×96 pixels of noise: thresholds in the first and the last rows 5 % off those of
+/// the mirrored picture.
 const SURROUND_WAVELENGTHS: f64 = 2.0;
 
 /// Threshold elevation, 1 to 3, of one band, on a grid as fine as the band needs.
@@ -127,9 +134,9 @@ fn mask_gain(source: &MaskSource<'_>, bands: &OctaveBands, band: usize) -> Radia
 
 /// Where a band's masks are known.
 struct BandGrid {
-    /// Of the energy and what comes of it.
+    /// Where samples of the energy and of what comes of it stand.
     frame: Frame,
-    /// Of the amplitude, twice as densely.
+    /// Where samples of the amplitude stand, twice as densely.
     amplitude_frame: Frame,
     /// The wavelength of the band's centre along x and y, in samples of `frame`.
     wavelengths: [f64; 2],

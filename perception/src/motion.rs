@@ -1,4 +1,8 @@
 //! Motion: what moves over the picture, and what of it moves over the retina.
+//!
+//! The eye's pursuit is Daly's (1998), by attention as Yee, Pattanaik and Greenberg have it (2001). For error that
+//! travels with things or is locked to the screen. Not for noise that is new in every frame, of which motion hides
+//! nothing, but for what the eye's own movement smears ([`ThresholdMap::with_pursuit`]).
 
 use crate::csf::pursued_noise::PursuedNoise;
 use crate::csf::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, FrameTiming, PURSUIT_GAIN};
@@ -18,8 +22,8 @@ pub enum ErrorMotion {
     Fresh,
     /// Error that travels with the object (from reprojected or cached samples): seen through the retinal velocity.
     Travelling,
-    /// The same noise pattern in every frame, locked to the screen: as the eye follows the object, the pattern crosses the
-    /// retina at the eye's own velocity; where the eye rests it is static noise.
+    /// Noise of one pattern in every frame, locked to the screen: as the eye follows the object, the pattern crosses
+    /// the retina at the eye's own velocity; where the eye rests it is static noise.
     Locked,
 }
 
@@ -116,7 +120,7 @@ impl VelocityTable {
 }
 
 impl ThresholdMap {
-    /// The same thresholds of noise that is new in every frame, for eyes that move at `eye_velocity_deg_s` at each place (see
+    /// Thresholds of noise that is new in every frame, for eyes that move at `eye_velocity_deg_s` at each place (see
     /// [`eye_velocity_deg_s`]; at most 80 deg/s counts): each frame is smeared over the retina while the display holds it.
     ///
     /// Only for thresholds of fresh noise ([`crate::csf::FreshNoise`] with the same timing), and only where eyes do move: a viewer

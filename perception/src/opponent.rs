@@ -1,4 +1,7 @@
 //! Opponent colour: what the eye makes of RGB behind the cones.
+//!
+//! castleCSF's mechanisms (Ashraf et al. 2024) on the cones of CIE 170-1:2006, for error over the adaptation luminance.
+//! Not for how colours look: there is no hue or saturation in it, and no chromatic adaptation.
 
 use crate::photometry::{REC709_WEIGHTS, luminance};
 
@@ -8,11 +11,11 @@ use crate::photometry::{REC709_WEIGHTS, luminance};
 /// contrast sensitivity function (see [`crate::threshold::chromatic_threshold_map`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Opponent {
-    /// Luminance.
+    /// Luminance, cd/m².
     pub achromatic: f32,
-    /// L − M, positive towards red.
+    /// Red–green signal L − M, cd/m², positive towards red.
     pub red_green: f32,
-    /// S − (L + M), positive towards violet.
+    /// Yellow–violet signal S − (L + M), cd/m², positive towards violet.
     pub yellow_violet: f32,
 }
 

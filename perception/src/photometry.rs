@@ -1,4 +1,7 @@
 //! From linear RGB to luminance.
+//!
+//! For linear Rec. 709; other colour spaces go through [`crate::primaries`] first. Not for light that no red, green and
+//! blue stand for: what rods see of a spectrum is only approximated by three channels.
 
 /// Rec. 709 luminance weights for linear red, green and blue with a D65 white (ITU-R BT.709-6, section 3.2).
 pub const REC709_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];

@@ -12,19 +12,19 @@ pub struct PixelDensity {
 }
 
 impl PixelDensity {
-    /// Of square pixels, so many to a degree.
+    /// Density of square pixels, `pixels_per_degree` along both axes.
     #[must_use]
     pub fn square(pixels_per_degree: f64) -> Self {
         Self { horizontal: pixels_per_degree, vertical: pixels_per_degree }
     }
 
-    /// Of a picture with this many times the pixels along both axes.
+    /// Density of a picture with `scale` times the pixels along both axes.
     #[must_use]
     pub fn times(self, scale: f64) -> Self {
         Self { horizontal: scale * self.horizontal, vertical: scale * self.vertical }
     }
 
-    /// Pixels along a row and along a column for this many degrees.
+    /// Pixels along a row and along a column that `degrees` of visual angle take.
     ///
     /// ```
     /// use fechner_perception::display::PixelDensity;

@@ -18,7 +18,7 @@ pub struct Plane {
 /// Luminance above which nothing is answered: sums over windows must stay within `f32`.
 const LARGEST_LUMINANCE_CD_M2: f32 = 1e30;
 
-/// Pixels that are worth handing to another thread: 16,384 left a second core idle at 128×128.
+/// Pixels that are worth handing to another thread. Measured at 128×128 pixels: 16,384 leave a second core idle.
 pub const PIXELS_A_TASK: usize = 1 << 12;
 
 impl Plane {
@@ -60,13 +60,13 @@ impl Plane {
         plane
     }
 
-    /// Columns.
+    /// Number of columns.
     #[must_use]
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// Number of rows.
     #[must_use]
     pub fn height(&self) -> usize {
         self.height
@@ -123,7 +123,8 @@ impl Plane {
         result
     }
 
-    /// Half of what it differs by from another of the same shape: of two halves of a picture, as strong as the noise of their mean.
+    /// Half of the difference from another plane of the same shape, (own − other) / 2: of two halves of a picture, as
+    /// strong as the noise of their mean.
     ///
     /// # Panics
     /// Unless the other plane has as many columns and rows.
@@ -142,6 +143,31 @@ impl Plane {
         let chunks: Vec<f64> =
             self.values.par_chunks(1 << 14).map(|chunk| chunk.iter().map(|&value| f64::from(value)).sum()).collect();
         chunks.iter().sum::<f64>() / self.values.len() as f64
+    }
+
+    /// Largest value, 0 at least; 0 for a plane without pixels. NaN does not count.
+    ///
+    /// ```
+    /// use fechner_perception::Plane;
+    /// assert_eq!(Plane::from_fn(5, 2, |x, y| (x * y) as f32).max(), 4.0);
+    /// assert_eq!(Plane::filled(2, 2, -1.0).max(), 0.0);
+    /// ```
+    #[must_use]
+    pub fn max(&self) -> f32 {
+        self.values.iter().copied().fold(0.0, f32::max)
+    }
+
+    /// Share of the pixels, in [0, 1], whose value is above `value`; 0 for a plane without pixels. NaN is above
+    /// nothing.
+    ///
+    /// ```
+    /// use fechner_perception::Plane;
+    /// assert_eq!(Plane::from_fn(4, 1, |x, _| x as f32).share_above(1.0), 0.5);
+    /// ```
+    #[must_use]
+    pub fn share_above(&self, value: f64) -> f64 {
+        let above = self.values.iter().filter(|own| f64::from(**own) > value).count();
+        above as f64 / self.values.len().max(1) as f64
     }
 
     /// The value that this share of the pixels, in [0, 1], stays at or below; 0 for a plane without pixels.
@@ -250,7 +276,7 @@ mod tests {
         assert_eq!(plane.get(2, 1), 12.0);
     }
 
-    /// The number of pixels went round: this plane had two values.
+    /// Regression: the number of pixels wrapped around, and this plane had two values.
     #[test]
     #[should_panic(expected = "capacity overflow")]
     fn more_pixels_than_can_be_counted_are_refused() {

@@ -1,9 +1,12 @@
 //! Colour spaces by their primaries.
+//!
+//! For colours that are to stay the same. Not for bringing them into what a display can show: what another space does
+//! not hold gets negative channels ([`crate::tone::gamut`]).
 
 /// A 3×3 matrix, row by row.
 pub type Matrix = [[f64; 3]; 3];
 
-/// Leaves colours as they are.
+/// The identity matrix, which leaves colours as they are.
 pub const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// CIE 1931 chromaticities of an additive colour space.
@@ -42,7 +45,8 @@ impl Primaries {
     /// CIE XYZ itself, whose white is that of equal energy.
     pub const XYZ: Self = Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
 
-    /// From linear RGB to XYZ with the white at Y = 1; `None` where the three primaries span no colours.
+    /// Matrix from this space's linear RGB to XYZ with the white at Y = 1; `None` where the three primaries span no
+    /// colours.
     #[must_use]
     pub fn to_xyz(&self) -> Option<Matrix> {
         let column = |[x, y]: [f64; 2]| [x, y, 1.0 - x - y];
@@ -54,7 +58,8 @@ impl Primaries {
         matrix.iter().flatten().all(|value| value.is_finite()).then_some(matrix)
     }
 
-    /// From this space's linear RGB to another's, colours kept as they are: a white of another colour stays of that colour.
+    /// Matrix from this space's linear RGB to another's, colours kept as they are: a white of another colour stays of
+    /// that colour.
     #[must_use]
     pub fn to(&self, other: &Self) -> Option<Matrix> {
         Some(product(&inverse(&other.to_xyz()?)?, &self.to_xyz()?))
@@ -66,7 +71,7 @@ impl Primaries {
         if self.is_like(other) { None } else { self.to(other) }
     }
 
-    /// Whether all coordinates agree to 0.001.
+    /// Whether all chromaticities agree with another space's to 0.001.
     #[must_use]
     pub fn is_like(&self, other: &Self) -> bool {
         let points = |p: &Self| [p.red, p.green, p.blue, p.white];
@@ -89,19 +94,19 @@ impl Primaries {
     }
 }
 
-/// `matrix` times a column.
+/// The product of `matrix` and a column vector.
 #[must_use]
 pub fn apply(matrix: &Matrix, column: [f64; 3]) -> [f64; 3] {
     matrix.map(|row| row[0] * column[0] + row[1] * column[1] + row[2] * column[2])
 }
 
-/// `left` times `right`.
+/// The product of two matrices, `left` times `right`.
 #[must_use]
 pub fn product(left: &Matrix, right: &Matrix) -> Matrix {
     transposed(transposed(*right).map(|column| apply(left, column)))
 }
 
-/// The inverse, by cofactors; `None` for a matrix that has none.
+/// The inverse of `matrix`, by cofactors; `None` where it has none.
 #[must_use]
 pub fn inverse(matrix: &Matrix) -> Option<Matrix> {
     let [a, b, c] = *matrix;

@@ -1,4 +1,6 @@
-//! From visibility to the probability of seeing.
+//! From visibility to the probability of seeing, by a Weibull function of Daly's slope.
+//!
+//! For one patch of 1°. Not for whole pictures, whose patches each have a chance of their own.
 
 /// Slope of the psychometric function (Daly's value, default of HDR-VDP 1).
 pub const SLOPE: f64 = 3.5;

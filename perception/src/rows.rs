@@ -8,8 +8,8 @@ pub(crate) const BORDER: usize = 16;
 /// Columns that a window shows.
 pub(crate) const TILE: usize = 64;
 
-/// [`TILE`] columns of every channel of a row with [`BORDER`] more on each side. Of a length that the compiler knows: where it did not,
-/// two of five instructions of the filter asked whether they might read.
+/// [`TILE`] columns of every channel of a row with [`BORDER`] more on each side. Of a length that the compiler knows:
+/// where it does not, two of five instructions of the filter ask whether they may read.
 pub(crate) type Window<const CHANNELS: usize> = [[f32; BORDER + TILE + BORDER]; CHANNELS];
 
 /// Row y holds channel 0 of its pixels, then channel 1, and so on: loops along a row run on vector registers, and one

@@ -3,6 +3,9 @@
 //! Itti, Koch and Niebur, "A model of saliency-based visual attention for rapid scene analysis", IEEE PAMI 20(11), 1998:
 //! centre–surround differences of intensity, opponent colour and orientation over a pyramid; and of motion, as Yee,
 //! Pattanaik and Greenberg added in 2001.
+//!
+//! It is of what draws the eye by itself, and knows no task, no faces and no text. Not for thresholds of stills:
+//! attention decides what moving things the eye follows ([`crate::motion`]), and changes nothing where nothing moves.
 
 use crate::display::Display;
 use crate::error::Error;
@@ -63,14 +66,14 @@ pub fn saliency(inputs: &SaliencyInputs<'_>) -> Result<Plane, Error> {
         conspicuity((0..4).map(|turn| pyramid.oriented(turn)).collect::<Vec<_>>().iter()),
     ];
     if let Some(velocity) = inputs.velocity {
-        let fastest = velocity.values().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        let fastest = velocity.max().max(f32::MIN_POSITIVE);
         conspicuities.push(conspicuity([Pyramid::of(&velocity.map(|speed| speed / fastest))].iter()));
     }
     let mut sum = Plane::filled(conspicuities[0].width(), conspicuities[0].height(), 0.0);
     for map in &conspicuities {
         add(&mut sum, &promoted(map));
     }
-    let largest = sum.values().iter().copied().fold(0.0, f32::max);
+    let largest = sum.max();
     if largest <= 1e-6 {
         return Ok(Plane::filled(width, height, 1.0));
     }
@@ -129,7 +132,7 @@ impl Pyramid {
 
 /// Red–green and blue–yellow, hue only where there is light enough to see it.
 fn opponent_colours(rgb: [&Plane; 3], intensity: &Plane) -> [Plane; 2] {
-    let brightest = intensity.values().iter().copied().fold(0.0, f32::max);
+    let brightest = intensity.max();
     let channel = |opponent: fn(f32, f32, f32) -> f32| {
         Plane::from_fn(intensity.width(), intensity.height(), |x, y| {
             let light = intensity.get(x, y);
@@ -174,7 +177,7 @@ fn conspicuity<'a>(pyramids: impl Iterator<Item = &'a Pyramid>) -> Plane {
 fn promoted(map: &Plane) -> Plane {
     // Of what goes up to 1 less than that is rounding.
     const LEAST: f32 = 1e-5;
-    let largest = map.values().iter().copied().fold(0.0, f32::max);
+    let largest = map.max();
     if largest <= LEAST {
         return map.map(|_| 0.0);
     }

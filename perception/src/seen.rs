@@ -2,6 +2,9 @@
 //!
 //! A pixel's error is pushed through the operator by itself, with what the eye is adapted to at that pixel; how a local
 //! operator would spread it to other pixels is ignored.
+//!
+//! Not for what an operator does before its curve: loss of acuity is a filter on light and noise alike
+//! ([`crate::tone::acuity`]).
 
 mod bent;
 mod shown;
@@ -16,7 +19,7 @@ use bent::variances_of_colour;
 use rayon::prelude::*;
 use shown::{Noise, Shown};
 
-/// What the display shows, cd/m², for scene luminance in cd/m².
+/// Displayed luminance of every pixel, cd/m², for a picture of scene luminance, cd/m².
 #[must_use]
 pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
@@ -25,7 +28,7 @@ pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_lumin
     })
 }
 
-/// The same for one pixel.
+/// Displayed luminance of one pixel, cd/m²: [`display_luminance`] at `pixel`, whose scene luminance is `scene_cd_m2`.
 #[must_use]
 pub fn display_luminance_at(fitted: &dyn FittedTone, display: &Display, pixel: Pixel, scene_cd_m2: f32) -> f32 {
     Shown { fitted, display }.cd_m2(pixel, scene_cd_m2)
@@ -56,9 +59,9 @@ pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance
 /// σ is how far the mean is off by them, not 3σ²/M, which may be far above a clip. An operator that is linear over the
 /// points gives exactly its slope² · σ².
 ///
-/// Of a point lamp 6 cm below a ceiling 16 samples a pixel leave noise of visibility 19.7 ± 2.0 by the thresholds of the
-/// converged picture, 14 by its comparison: by the three points alone it was told as 10.8, by M + σ alone as 26.2, and is
-/// as 19.9 (`benches/results/beyond-white.md`).
+/// Measured on a point lamp 6 cm below a ceiling at 16 samples a pixel (`benches/results/beyond-white.md`): visibility
+/// 19.7 ± 2.0 by the thresholds of the converged picture, 14 by comparison with it; predicted by the three points alone
+/// 10.8, by M + σ alone 26.2, by this rule 19.9.
 ///
 /// Where normal noise (√3 σ ≤ M) reaches over a clip of the display, three points see too much of it or nothing at all; there the
 /// operator is asked at 21 points, −4σ to 4σ.
@@ -76,7 +79,7 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
     })
 }
 
-/// A picture's colours, on which noise is.
+/// Colours of a picture on which there is noise.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneColours<'a> {
     /// Linear Rec. 709 RGB of any strength, row-major: noise of luminance makes it brighter and darker.
@@ -86,10 +89,10 @@ pub struct SceneColours<'a> {
 }
 
 impl SceneColours<'_> {
-    /// That of a pixel by its place in the picture.
+    /// The colour of one pixel, by its row-major index.
     ///
     /// # Panics
-    /// Outside of it.
+    /// For an index outside the picture.
     #[must_use]
     pub fn at(&self, index: usize) -> SceneColour {
         SceneColour { rgb: self.rgb[index], chromatic_slope: self.chromatic_slope.values()[index] }
@@ -125,24 +128,24 @@ pub fn display_opponent_variances(
     std::array::from_fn(|channel| Plane::from_fn(width, height, |x, y| found[y * width + x][channel]))
 }
 
-/// One pixel of [`SceneColours`].
+/// The colour of one pixel of [`SceneColours`].
 #[derive(Clone, Copy, Debug)]
 pub struct SceneColour {
     /// Linear Rec. 709 RGB of any strength.
     pub rgb: [f32; 3],
-    /// Of [`display_chromatic_slope`].
+    /// What the operator leaves of a faint tint on a grey as bright as the pixel: [`display_chromatic_slope`] there.
     pub chromatic_slope: f32,
 }
 
-/// What operator and display make of noise, for those who have it pixel by pixel.
+/// Noise behind an operator and a display: [`display_opponent_variances`] for those who have it pixel by pixel.
 pub struct NoiseShown<'a> {
     shown: Shown<'a>,
-    /// Of tints on black.
+    /// Room of tints on black, red–green and yellow–violet.
     rooms_cd_m2: [f64; 2],
 }
 
 impl<'a> NoiseShown<'a> {
-    /// Of this operator and this display.
+    /// Noise behind this operator and this display.
     #[must_use]
     pub fn new(fitted: &'a dyn FittedTone, display: &'a Display) -> Self {
         let rooms_cd_m2 = [ChromaticChannel::RedGreen, ChromaticChannel::YellowViolet]
@@ -194,7 +197,8 @@ fn told(scene: [f32; 3], displayed: [f32; 3]) -> [f32; 3] {
     )
 }
 
-/// What of a colour, linear Rec. 709 RGB in scene cd/m², the display shows at `pixel`, cd/m²: more than where it shows nothing.
+/// Opponent signals, cd/m², of a colour (linear Rec. 709 RGB in scene cd/m²) as displayed at `pixel`: what the display
+/// shows more than where it shows nothing.
 #[must_use]
 pub fn display_opponent(fitted: &dyn FittedTone, display: &Display, pixel: Pixel, rgb_cd_m2: [f32; 3]) -> Opponent {
     Shown { fitted, display }.opponent(pixel, rgb_cd_m2)
@@ -213,8 +217,8 @@ fn room_of_tints(channel: ChromaticChannel) -> f64 {
     (row[raised] - green_for_raised * row[1]).abs() / green_for_raised
 }
 
-/// How much a chromatic signal as displayed is of that of the scene where that is faint ([`FittedTone::chromatic_slope_at`]). What
-/// a display's clip of single channels hides is not taken off.
+/// Chromatic signal as displayed over that of the scene, where that is faint, at every pixel
+/// ([`FittedTone::chromatic_slope_at`]). What a display's clip of single channels hides is not taken off.
 #[must_use]
 pub fn display_chromatic_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
@@ -270,7 +274,7 @@ mod tests {
         operator("absolute", None).unwrap().fit(&SceneGuide::of(&guide), &viewing, None)
     }
 
-    /// Of red and green, where luminance has no noise.
+    /// Variance of red–green as displayed, where luminance has no noise.
     fn chromatic_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
         let slope = display_chromatic_slope(fitted, display, mean);
         let grey = SceneColours { rgb: &[[1.0; 3]], chromatic_slope: &slope };
@@ -298,8 +302,9 @@ mod tests {
         }
     }
 
-    /// One sample in 200 brings all light, and 16 are taken: what each pixel's own variance makes of it, on the mean of all, is what the means of
-    /// pixels show, or half of that where the three points reach above white, which alone said nothing.
+    /// One sample in 200 brings all light, and 16 are taken: what each pixel's own variance makes of it, on the mean of
+    /// all, is what the means of pixels show, or half of that where the three points reach above white. Regression: the
+    /// three points alone said that nothing shows there.
     #[test]
     fn light_that_few_samples_bring_shows_at_a_clip() {
         let display = Display::default();
@@ -404,13 +409,14 @@ mod tests {
         }
     }
 
-    /// A colour pales as it brightens, and noise of its luminance is noise of its colour, by 2001 such luminances: by what the operator leaves
-    /// of tints alone the last three were told as 0.54, 0.39 and 0.19 of it.
+    /// A colour pales as it brightens, and noise of its luminance is noise of its colour, by 2001 such luminances.
+    /// Regression: with what the operator leaves of tints alone, the last three cases were predicted as 0.54, 0.39 and
+    /// 0.19 of it.
     #[test]
     fn noise_of_luminance_pales_colours() {
         let display = Display::default();
         let fitted = absolute(&display);
-        // What is squeezed already has some of its noise told that is hidden: at most twice and a half.
+        // Of what is squeezed already some noise is predicted that is hidden: at most twice and a half.
         for (colour, mean, deviation, most) in [
             ([0.6, 0.06, 0.05], 30.0, 2.0, 1.05),
             ([0.6, 0.06, 0.05], 110.0, 8.0, 2.5),
@@ -455,8 +461,9 @@ mod tests {
         Tint(f64),
     }
 
-    /// Of a colour whose channels are bent or clipped each by itself, against 2001 lights. By tints of greys a blue beyond its clip was told as
-    /// 7 times what is seen, and one of whose luminance is beyond white as nothing.
+    /// Noise of a colour whose channels are bent or clipped each by itself, against 2001 lights. Regression: judged by
+    /// tints of greys, noise of a blue beyond its clip was predicted as 7 times what is seen, and that of a blue whose
+    /// luminance is beyond white as nothing.
     #[test]
     fn noise_of_colours_is_told_where_channels_are_bent_alone() {
         let display = Display::default();
@@ -511,7 +518,7 @@ mod tests {
             for signal in 0..3 {
                 let truth = (squares[signal] / weights - (sums[signal] / weights).powi(2)).sqrt();
                 let told = f64::from(told[signal].get(0, 0)).sqrt();
-                // What tints do to luminance, and to each other, is not told.
+                // What tints do to luminance, and to each other, is not predicted.
                 let is_of_tint = matches!(noise, NoiseOf::Tint(_)) && signal != 1;
                 // Where one channel is clipped now and then three points are up to 0.27 off.
                 let is_right = (told / truth.max(1e-3) - 1.0).abs() < 0.3 || truth.max(told) < 0.02;

@@ -63,8 +63,8 @@ fn log2(value: f32) -> f32 {
     octaves as f32 + 2.0 * std::f32::consts::LOG2_E * ratio * series
 }
 
-/// The luminances that tables are made for, as samples of the whole grid: to ask a CSF for all ten decades took a tenth of a look
-/// at 128×128 pixels.
+/// The luminances that tables are made for, as samples of the whole grid: a picture's own. Measured at 128×128 pixels:
+/// a CSF that is asked for all ten decades takes a tenth of a look.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LuminanceSpan {
     first: usize,

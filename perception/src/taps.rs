@@ -100,7 +100,7 @@ fn mirror(extended: &mut [f32], padding: usize, width: usize) {
     mirror_by(extended, padding, width, padding);
 }
 
-/// The same of the `reach` samples next to the middle.
+/// Fills the `reach` samples next to the middle on each side with their mirror image.
 fn mirror_by(extended: &mut [f32], padding: usize, width: usize, reach: usize) {
     for index in (padding - reach..padding).chain(padding + width..padding + width + reach) {
         extended[index] = extended[padding + reflect(index as isize - padding as isize, width)];

@@ -1,6 +1,6 @@
 //! The specification's tables of reference values, for the tests beside what they are about and for `tests/golden.rs`.
 
-/// As text; every table has a test that asks for it by its name.
+/// The tables as text; every table has a test that asks for it by its name.
 pub(crate) const TABLES: &str = include_str!("../tests/golden.json");
 
 /// Rows of one table: inputs, then the value. A table of one number is a row without inputs.

@@ -1,4 +1,9 @@
 //! The threshold map: how much error each pixel of a picture may have before it is seen.
+//!
+//! For a still in display cd/m², and error in it. Not for pictures with noise that nobody knows of, since noise that
+//! passes for texture hides noise: denoise them ([`crate::guide`]) or say how strong it is ([`GuideNoise`]). For motion
+//! see [`ThresholdMap::with_motion`] and [`ThresholdMap::with_pursuit`], for differences of moving pictures
+//! [`crate::sequence`].
 
 use crate::adaptation::adapted;
 use crate::bands::OctaveBands;
@@ -28,7 +33,7 @@ pub struct ThresholdInputs<'a> {
 }
 
 impl<'a> ThresholdInputs<'a> {
-    /// Those of a picture without noise, cd/m² on the display.
+    /// Inputs for a picture without noise, cd/m² on the display.
     #[must_use]
     pub fn clean(display_luminance_cd_m2: &'a Plane) -> Self {
         Self { display_luminance_cd_m2, guide_noise: GuideNoise::Clean }
@@ -51,7 +56,7 @@ pub enum GuideNoise<V> {
 }
 
 impl<V> GuideNoise<V> {
-    /// The same of another form of the variance.
+    /// What is known of the same noise, with another form of its variance.
     pub(crate) fn map<W>(self, change: impl FnOnce(V) -> W) -> GuideNoise<W> {
         match self {
             Self::Clean => GuideNoise::Clean,
@@ -189,8 +194,9 @@ fn assemble(
 const FEW_PIXELS: usize = 1 << 16;
 
 /// Contrast of a mask, in adaptation luminances, beyond which more would mask no more (a few threshold units are the cap) and only
-/// cost the rest of the transform its precision: beside a lone lamp of 1e5 × white its rounding raised thresholds threefold all over the
-/// picture. Shown pictures stay below: a night view with lamps of 1000 × its black reached 25.
+/// cost the rest of the transform its precision. Measured without it, beside a lone lamp of 1e5 × white: rounding
+/// raises thresholds threefold all over the picture. Shown pictures stay below: a night view with lamps of 1000 × its
+/// black reaches 25.
 const LARGEST_MASK_CONTRAST: f32 = 30.0;
 
 /// Who looks, and what is tabulated of it.
@@ -291,7 +297,7 @@ impl ThresholdMap {
         noise_gain(&self.tables, &self.adaptation_cd_m2, &[])
     }
 
-    /// The same map with [`masking_elevation`](Self::masking_elevation) 1 everywhere: nothing hides error.
+    /// This map with [`masking_elevation`](Self::masking_elevation) 1 everywhere: nothing hides error.
     #[must_use]
     pub fn without_masking(mut self) -> Self {
         self.noise_gain = self.unmasked_noise_gain();
@@ -299,7 +305,8 @@ impl ThresholdMap {
         self
     }
 
-    /// The same thresholds for error that moves over the retina at `retinal_velocity_deg_s` (see [`crate::motion`]).
+    /// Thresholds of this picture for error that moves over the retina at `retinal_velocity_deg_s` (see
+    /// [`crate::motion`]).
     ///
     /// Each band's threshold is raised, or at low frequencies lowered, by the ratio of Daly's 1998 spatiovelocity
     /// sensitivity at rest to that in motion at the band's centre, kept within 0.1 and 20. What moves no faster than the eye drifts
@@ -333,13 +340,13 @@ impl ThresholdMap {
         &self.viewing
     }
 
-    /// Columns, pixels.
+    /// Columns of the map, pixels.
     #[must_use]
     pub fn width(&self) -> usize {
         self.adaptation_cd_m2.width()
     }
 
-    /// Rows, pixels.
+    /// Rows of the map, pixels.
     #[must_use]
     pub fn height(&self) -> usize {
         self.adaptation_cd_m2.height()

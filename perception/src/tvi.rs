@@ -1,4 +1,8 @@
 //! Threshold versus intensity: how much brighter a large spot must be than its background to be seen.
+//!
+//! After Ferwerda, Pattanaik, Shirley and Greenberg 1996 and Ward Larson, Rushmeier and Piatko 1997. For ratios of
+//! thresholds, as tone operators take them. Not for noise as the curves stand: in daylight they are 7 to 9 times too
+//! lenient for it ([`ThresholdBase::CsfPeak`]).
 
 use crate::csf::{ContrastSensitivity, peak_sensitivity};
 

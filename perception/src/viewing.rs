@@ -6,7 +6,7 @@ use crate::csf::check_area_deg2;
 use crate::display::Display;
 use crate::error::{Error, check_range};
 
-/// The eye.
+/// The eye that looks: how keen it is, what it is asked about and what it scatters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Observer {
     /// Multiplies contrast sensitivity: 1 is the median observer of the model's data, 1.75 a keen one.
@@ -27,7 +27,7 @@ pub enum Glare {
     None,
     /// A veil by the CIE's general disability glare equation for an eye of this age.
     Cie {
-        /// Years.
+        /// Age of the eye, years.
         age_years: f64,
     },
 }
@@ -47,7 +47,7 @@ impl Default for Observer {
     }
 }
 
-/// Who looks at what.
+/// An eye in front of a display, for which every judgement of a picture is made.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Viewing {
     /// The display at its distance.
@@ -65,7 +65,7 @@ impl Viewing {
         Self { display, observer }
     }
 
-    /// Rejects a viewing that cannot be.
+    /// Rejects a viewing with a field outside its range.
     ///
     /// # Errors
     /// [`Error::OutOfRange`], naming the field.

@@ -3,6 +3,9 @@
 //! v(x) = √2 · sqrt(g ⊗ E\[V²\])(x), where V is the display error over the adaptation luminance, through the contrast
 //! sensitivity function and divided by each band's masking, and g is a Gaussian of σ 0.25°. Bands add by energy. A
 //! grating at its threshold has v = 1: the √2 turns its RMS into its amplitude.
+//!
+//! For whether an error is seen, and how far it is above threshold or below. Not for how much it disturbs: twice the
+//! visibility is twice the amplitude, and no judgement of quality.
 
 use crate::error_filters::{ErrorFilters, LARGEST_RELATIVE_ERROR};
 use crate::filter::{gaussian_blur_xy, squared_weights};
@@ -14,10 +17,10 @@ use std::f64::consts::SQRT_2;
 /// The square of [`LARGEST_RELATIVE_ERROR`].
 const LARGEST_RELATIVE_VARIANCE: f32 = LARGEST_RELATIVE_ERROR * LARGEST_RELATIVE_ERROR;
 
-/// What a measured error looks like.
+/// Visibility of a measured error, pooled and not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredError {
-    /// v(x) in threshold units: pooled, times √2.
+    /// Visibility v(x) in threshold units: pooled, times √2.
     pub visibility: Plane,
     /// The unpooled amplitude sqrt(Σ_b `V_b`²) at each pixel in threshold units: what a lone bright pixel shows,
     /// which pooling would hide.

@@ -1,4 +1,7 @@
-//! Barten's short formula.
+//! Barten's short formula of 1989: sensitivity by frequency and luminance in closed form.
+//!
+//! For ratios of sensitivities, and to compare with perceptualdiff and OpenImageIO. Not for absolute thresholds, which
+//! lie 2 to 3 times higher for 1°, and not where area, motion or colour matter: it knows none.
 
 use super::{ContrastSensitivity, HIGHEST_CPD};
 

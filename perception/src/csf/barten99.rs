@@ -1,4 +1,7 @@
-//! Barten's physical model of contrast sensitivity.
+//! Barten's physical model of contrast sensitivity, 1999: optics, photon noise, neural noise and lateral inhibition.
+//!
+//! For static gratings of any area and luminance in the fovea. Not for motion, flicker or colour, which it does not
+//! know.
 
 use super::ContrastSensitivity;
 

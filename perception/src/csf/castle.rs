@@ -1,4 +1,9 @@
-//! castleCSF.
+//! castleCSF's sustained achromatic channel (Ashraf et al. 2024): the function that everything uses unless told
+//! otherwise.
+//!
+//! For static gratings in the fovea, from 0.001 to 10 000 cd/m² and up to 64 cpd. Not for flicker and drift
+//! ([`super::CastleTemporal`]), nor for colour ([`super::CastleChromatic`]); away from the gaze [`crate::eccentricity`]
+//! takes off.
 
 use super::{ContrastSensitivity, check_area_deg2};
 use crate::error::Error;
@@ -17,7 +22,7 @@ pub struct CastleCsf {
 }
 
 impl CastleCsf {
-    /// For gratings that cover `area_deg2` square degrees.
+    /// castleCSF for gratings that cover `area_deg2` square degrees.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] unless the area lies between 0.001 and 10 000 deg².
@@ -26,7 +31,7 @@ impl CastleCsf {
         Ok(Self { area_deg2 })
     }
 
-    /// The grating's area, deg².
+    /// Area of the gratings, deg².
     #[must_use]
     pub fn area_deg2(&self) -> f64 {
         self.area_deg2

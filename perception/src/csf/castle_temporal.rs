@@ -1,4 +1,8 @@
-//! castleCSF for gratings that flicker or drift.
+//! castleCSF for gratings that flicker or drift: its sustained and its transient channel together (Ashraf et al. 2024).
+//!
+//! For one temporal frequency. Not for noise that is new in every frame, which holds all of them at once
+//! ([`super::FreshNoise`]). Below 0.03 cd/m² the transient channel's best flicker is held at 1 Hz, which is ours and no
+//! measurement.
 
 use super::ContrastSensitivity;
 use super::castle::{CastleCsf, DOMAIN_DECADES, Summation, in_domain};
@@ -12,7 +16,7 @@ use crate::table::Between;
 /// is at least 1 Hz, and at 0 Hz there is the sustained channel alone, so that the static case equals [`CastleCsf`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CastleTemporal {
-    /// The static function.
+    /// The sustained channel at 0 Hz, which is the static function, and whose area the transient channel has too.
     pub sustained: CastleCsf,
     /// Temporal frequency, Hz: spatial frequency times retinal velocity for a drifting grating.
     pub temporal_hz: f64,
@@ -65,7 +69,7 @@ pub(super) struct Energies {
 }
 
 impl Energies {
-    /// Of channels of these spatial sensitivities, together.
+    /// Energy that both channels together receive, of these spatial sensitivities.
     pub(super) fn seen_by(self, sustained: f64, transient: f64) -> f64 {
         self.sustained * sustained * sustained
             + 2.0 * self.mixed * sustained * transient

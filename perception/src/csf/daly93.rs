@@ -1,4 +1,7 @@
-//! The contrast sensitivity of Daly's visible differences predictor.
+//! The contrast sensitivity of Daly's visible differences predictor, 1993.
+//!
+//! For comparison with that predictor: static gratings in the fovea, by area, distance and orientation. Not for motion
+//! or colour, and not at the lowest frequencies, where its area term takes sensitivity to 0.
 
 use super::ContrastSensitivity;
 
@@ -8,7 +11,7 @@ use super::ContrastSensitivity;
 /// set: the code in circulation that goes with castleCSF has refitted constants and passes degrees to the cosine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Daly93 {
-    /// Area i², deg².
+    /// Area of the image, i² in the formula, deg².
     pub area_deg2: f64,
     /// Viewing distance, m.
     pub distance_m: f64,

@@ -1,4 +1,7 @@
-//! Daly's spatiovelocity contrast sensitivity.
+//! Daly's spatiovelocity contrast sensitivity, 1998, after Kelly 1979: gratings that move over the retina.
+//!
+//! For ratios between velocities ([`super::Moving`], [`crate::motion`]). Not for absolute thresholds: it knows neither
+//! area nor luminance, and is for about 100 cd/m², 0.15 to 80 deg/s and 0.1 to 60 cpd.
 
 use super::{ContrastSensitivity, HIGHEST_CPD};
 
@@ -18,7 +21,7 @@ pub struct Daly98 {
 pub const DRIFT_DEG_S: f64 = 0.15;
 /// The fastest smooth pursuit, deg/s (Daly 1998).
 pub const FASTEST_PURSUIT_DEG_S: f64 = 80.0;
-/// Gain of smooth pursuit (Daly 1998).
+/// Gain of smooth pursuit: velocity of the eye over that of what it follows (Daly 1998).
 pub const PURSUIT_GAIN: f64 = 0.82;
 
 /// Kelly's surface with constants: S = k · `gain` · c₂ v (2π ρ c₁)² exp(−4π c₁ ρ / `ρ_max`).

@@ -1,4 +1,7 @@
 //! What a frame of a moving picture leaves in the eye's temporal channels, a frame and several frames away.
+//!
+//! For frames within 0.2 s of the one that is shown. Not for the flicker that a display of short flashes adds to all
+//! that it shows, which is left out.
 
 use super::castle_chromatic::ChromaticChannel;
 use super::castle_temporal::{between_levels, levels_cd_m2, sustained_response, transient_response};
@@ -12,8 +15,9 @@ use std::ops::RangeInclusive;
 /// Seconds before and after a moment whose frames it is seen with: the sustained channel's response has fallen to 1 % by then.
 const REACH_S: f64 = 0.2;
 
-/// Looks at a display in a second, at the least. A step of light is seen most some 20 ms before and after it, and flicker of 12 Hz at
-/// its peak: from one look in the middle of each of 24 frames, ±3 % at 12 Hz had 0.80 of the contrast over threshold that it has.
+/// Looks at a display in a second, at the least: a step of light is seen most some 20 ms before and after it, and
+/// flicker of 12 Hz at its peak. Measured on flicker of ±3 % at 12 Hz: one look in the middle of each of 24 frames
+/// finds 0.80 of its contrast over threshold.
 const LOOKS_A_SECOND: f64 = 120.0;
 
 /// Weights of frames around the one that is shown, from [`FrameResponses::reach`] frames earlier to as many later.
@@ -89,13 +93,14 @@ impl FrameResponses {
         self.reach
     }
 
-    /// The same where only so many frames are before the one that is shown and so many after it: those that nobody has are expected to go on
-    /// as the others do, in what stands still and in what changes from frame to frame and back, and leave them what they weigh in both. What
-    /// stands still is then seen as in a still, flicker of every other frame as amid others, slower flicker on 100 cd/m² at 24 to 60 frames a
-    /// second 0.73 to 1.18 as well (in dim light or colours, where next to nothing is seen amid others, several times that), and noise that is
-    /// new in every frame nearly as amid others: the sustained channel holds 1.05 of it at 24 frames a second and at 60. *Turned down:* the mean
-    /// alone, by which the first frame of a flicker of ±5 % at 30 Hz had 3.2 times the visibility of those within; ends that stand still, 1.46 and
-    /// 1.89 of noise; frames that come again as in a mirror, 1.15 and 1.30.
+    /// These responses where only so many frames are before the one that is shown and so many after it: those that
+    /// nobody has are expected to go on as the others do, in what stands still and in what changes from frame to frame
+    /// and back, and leave them what they weigh in both. What stands still is then seen as in a still, flicker of every
+    /// other frame as amid others, slower flicker on 100 cd/m² at 24 to 60 frames a second 0.73 to 1.18 as well (in dim
+    /// light or colours, where next to nothing is seen amid others, several times that), and noise that is new in every
+    /// frame nearly as amid others: the sustained channel holds 1.05 of it at 24 frames a second and at 60. *Turned
+    /// down:* the mean alone (the first frame of a flicker of ±5 % at 30 Hz has 3.2 times the visibility of those
+    /// within); ends that stand still (1.46 and 1.89 of noise); frames that come again as in a mirror (1.15 and 1.30).
     pub(crate) fn within(&self, earlier: usize, later: usize) -> Self {
         let there = self.reach.saturating_sub(earlier)..=self.reach + later.min(self.reach);
         let of = |weights: &Weights| shared(weights, &there);
@@ -152,12 +157,12 @@ struct Moment {
     timing: FrameTiming,
     hz_step: f64,
     hz: Vec<f64>,
-    /// Of each frame, by frequency.
+    /// Waves of each frame, by frequency.
     waves: Vec<Vec<f64>>,
 }
 
 impl Moment {
-    /// So long after the middle of the frame that is shown.
+    /// The moment `moment_s` seconds after the middle of the frame that is shown.
     fn new(timing: FrameTiming, moment_s: f64) -> Self {
         let hz_step = timing.hz_step();
         let hz: Vec<f64> = (0..(HIGHEST_HZ / hz_step) as usize).map(|step| (step as f64 + 0.5) * hz_step).collect();
@@ -311,8 +316,9 @@ mod tests {
         }
     }
 
-    /// Flicker of frame after frame is seen at an end of a sequence as amid its frames, and slower flicker not much better: at 30 Hz and 60 frames
-    /// a second the first frame had 3 times the visibility of those within when what is beyond was taken for the mean of what is there.
+    /// Flicker of frame after frame is seen at an end of a sequence as amid its frames, and slower flicker not much
+    /// better. Regression: with what is beyond taken for the mean of what is there, the first frame of a flicker at
+    /// 30 Hz and 60 frames a second had 3 times the visibility of those within.
     #[test]
     fn flicker_is_seen_alike_at_ends() {
         for frames_per_second in [24.0, 30.0, 50.0, 60.0, 120.0] {

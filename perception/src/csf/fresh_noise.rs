@@ -32,10 +32,10 @@ pub(super) const HIGHEST_HZ: f64 = 120.0;
 const HZ_STEP: f64 = 0.25;
 
 impl FreshNoise {
-    /// What reports call it.
+    /// The name by which reports call this function.
     pub const NAME: &'static str = "castle-fresh-noise";
 
-    /// For patterns that cover `area_deg2` square degrees.
+    /// Sensitivity to fresh noise for patterns that cover `area_deg2` square degrees, in frames of this timing.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for an area as in [`CastleCsf::new`] or an impossible timing.

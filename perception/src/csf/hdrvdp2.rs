@@ -1,4 +1,7 @@
-//! The contrast sensitivity inside HDR-VDP 2.
+//! The contrast sensitivity inside HDR-VDP 2 (Mantiuk et al. 2011), by frequency and luminance.
+//!
+//! For comparison with that metric. Not for absolute thresholds, of which it has no scale, and not where area, motion
+//! or colour matter: it knows none.
 
 use super::ContrastSensitivity;
 
@@ -8,7 +11,7 @@ use super::ContrastSensitivity;
 /// absolute scale (31 at best at 20 cd/m²) and knows no area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HdrVdp2 {
-    /// Multiplies the published function.
+    /// Factor on the published function, which has no absolute scale.
     pub gain: f64,
 }
 

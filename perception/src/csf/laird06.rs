@@ -1,4 +1,7 @@
-//! Daly's spatiovelocity surface, fitted anew.
+//! Daly's spatiovelocity surface, fitted anew by Laird et al. 2006.
+//!
+//! For ratios between velocities of things that the eye is free to follow. Not for absolute thresholds: it knows
+//! neither area nor luminance, and is for about 100 cd/m².
 
 use super::ContrastSensitivity;
 use super::daly98::{Spatiovelocity, floored};

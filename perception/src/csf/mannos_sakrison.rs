@@ -1,4 +1,7 @@
-//! The first contrast sensitivity function of image coding.
+//! The first contrast sensitivity function of image coding (Mannos and Sakrison 1974).
+//!
+//! For teaching and comparison. Not for thresholds: it knows frequency alone, neither luminance nor area nor motion,
+//! and its scale is a gain that is given to it.
 
 use super::{ContrastSensitivity, HIGHEST_CPD};
 
@@ -9,7 +12,7 @@ use super::{ContrastSensitivity, HIGHEST_CPD};
 /// comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MannosSakrison {
-    /// Multiplies the normalised function.
+    /// Factor on the published function, which is at most 0.981.
     pub gain: f64,
 }
 

@@ -2,6 +2,9 @@
 //!
 //! S = 1 / (contrast amplitude at threshold), contrast = amplitude / mean luminance. The threshold *amplitude* of a
 //! grating of ρ cycles per degree on L cd/m² is therefore L / S(ρ, L) cd/m².
+//!
+//! All are of gratings, static, achromatic and seen foveally unless they say otherwise: not of spots, edges or text.
+//! Each module says what its function ignores.
 
 mod barten89;
 mod barten99;
@@ -36,12 +39,13 @@ pub use stela::StelaCsf;
 
 use crate::display::Viewing;
 use crate::error::{Error, check_range};
+use crate::names::{NamedTable, find, names_of};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// A contrast sensitivity function for static, achromatic gratings seen foveally.
 pub trait ContrastSensitivity: Send + Sync {
-    /// What the command line calls it.
+    /// The function's name on the command line.
     fn name(&self) -> &'static str;
 
     /// Sensitivity (1 / threshold contrast) at `freq_cpd` cycles per degree on a mean luminance of `luminance_cd_m2`.
@@ -56,7 +60,8 @@ pub trait ContrastSensitivity: Send + Sync {
         1.0
     }
 
-    /// Sensitivity of the eye to what gets there.
+    /// Sensitivity of the eye to the share of a grating that gets there: [`sensitivity`](Self::sensitivity) over
+    /// [`transfer`](Self::transfer).
     fn sensitivity_behind(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
         // What gets through by less than that is as good as lost.
         self.sensitivity(freq_cpd, luminance_cd_m2) / self.transfer(freq_cpd).max(1e-100)
@@ -116,8 +121,37 @@ pub(crate) fn check_area_deg2(what: &'static str, area_deg2: f64) -> Result<(), 
 /// The name of the function that everything uses unless told otherwise.
 pub const DEFAULT: &str = "castle";
 
-const NAMES: [&str; 9] =
-    [DEFAULT, "stela", "barten99", "barten89", "daly93", "daly98", "laird06", "hdrvdp2", "mannos-sakrison"];
+/// What the table of functions makes.
+type Made = Box<dyn ContrastSensitivity>;
+
+/// How a function is made.
+enum Constructor {
+    /// Without asking for whom.
+    Plain(fn() -> Made),
+    /// For gratings of an area, deg², and for the display's distance where it depends on that.
+    OfArea(fn(area_deg2: f64, &Viewing) -> Result<Made, Error>),
+}
+
+/// All functions, in the order in which they are listed.
+const FUNCTIONS: NamedTable<Constructor, 9> = [
+    (DEFAULT, Constructor::OfArea(|area_deg2, _| Ok(Box::new(CastleCsf::new(area_deg2)?)))),
+    ("stela", Constructor::OfArea(|area_deg2, _| Ok(Box::new(StelaCsf { area_deg2 })))),
+    ("barten99", Constructor::OfArea(|area_deg2, _| Ok(Box::new(Barten99 { field_deg: area_deg2.sqrt() })))),
+    ("barten89", Constructor::Plain(|| Box::new(Barten89))),
+    (
+        "daly93",
+        Constructor::OfArea(|area_deg2, viewing| {
+            let distance_m = viewing.display.distance_m.unwrap_or(Daly93::default().distance_m);
+            Ok(Box::new(Daly93 { area_deg2, distance_m, ..Daly93::default() }))
+        }),
+    ),
+    ("daly98", Constructor::Plain(|| Box::new(Daly98::default()))),
+    ("laird06", Constructor::Plain(|| Box::new(Laird06::default()))),
+    ("hdrvdp2", Constructor::Plain(|| Box::new(HdrVdp2::default()))),
+    ("mannos-sakrison", Constructor::Plain(|| Box::new(MannosSakrison::default()))),
+];
+
+const NAMES: [&str; FUNCTIONS.len()] = names_of(&FUNCTIONS);
 
 /// The names that [`by_name`] knows; the first is [`DEFAULT`].
 #[must_use]
@@ -128,7 +162,7 @@ pub fn names() -> &'static [&'static str] {
 /// Whether the function of that name depends on the area of the grating.
 #[must_use]
 pub fn knows_area(name: &str) -> bool {
-    matches!(name, "castle" | "stela" | "barten99" | "daly93")
+    matches!(find(&FUNCTIONS, name), Some(Constructor::OfArea(_)))
 }
 
 /// The function of that name, for the observer's area and the display's distance where it depends on them.
@@ -144,29 +178,11 @@ pub fn knows_area(name: &str) -> bool {
 /// ```
 pub fn by_name(name: &str, viewing: &Viewing) -> Result<Box<dyn ContrastSensitivity>, Error> {
     viewing.check()?;
-    let area_deg2 = viewing.observer.csf_area_deg2;
-    Ok(match name {
-        DEFAULT => Box::new(CastleCsf::new(area_deg2)?),
-        "barten99" => Box::new(Barten99 { field_deg: area_deg2.sqrt() }),
-        "daly93" => Box::new(Daly93 {
-            area_deg2,
-            distance_m: viewing.display.distance_m.unwrap_or(Daly93::default().distance_m),
-            ..Daly93::default()
-        }),
-        "stela" => Box::new(StelaCsf { area_deg2 }),
-        "barten89" => Box::new(Barten89),
-        "daly98" => Box::new(Daly98::default()),
-        "laird06" => Box::new(Laird06::default()),
-        "hdrvdp2" => Box::new(HdrVdp2::default()),
-        "mannos-sakrison" => Box::new(MannosSakrison::default()),
-        _ => {
-            return Err(Error::UnknownName {
-                kind: "contrast sensitivity function",
-                name: name.to_owned(),
-                known: NAMES.join(", "),
-            });
-        }
-    })
+    match find(&FUNCTIONS, name) {
+        Some(Constructor::Plain(make)) => Ok(make()),
+        Some(Constructor::OfArea(make)) => make(viewing.observer.csf_area_deg2, viewing),
+        None => Err(Error::unknown_name("contrast sensitivity function", name, names())),
+    }
 }
 
 /// Greatest sensitivity over 0.05 to 60 cpd at one luminance.
@@ -200,7 +216,7 @@ pub fn peak_sensitivity(csf: &dyn ContrastSensitivity, luminance_cd_m2: f64) -> 
 mod tests {
     use super::*;
 
-    /// Products that overflowed made NaN of four functions.
+    /// Regression: four functions were NaN where products overflowed.
     #[test]
     fn every_frequency_has_a_sensitivity() {
         for name in names() {
@@ -215,7 +231,21 @@ mod tests {
         assert!(Daly98::default().ln_sensitivity(f64::MAX).is_finite());
     }
 
-    /// Beyond what is asked for nothing counts, where the greatest sensitivity is at an end: the search went on to 0.0448 and 67 cpd.
+    #[test]
+    fn functions_know_whether_they_ask_the_area() {
+        for name in names() {
+            let of_area = |csf_area_deg2| {
+                let mut viewing = Viewing::default();
+                viewing.observer.csf_area_deg2 = csf_area_deg2;
+                by_name(name, &viewing).unwrap().sensitivity(2.0, 100.0)
+            };
+            assert_eq!(of_area(1.0) != of_area(7.0), knows_area(name), "{name}");
+            assert_eq!(by_name(name, &Viewing::default()).unwrap().name(), *name);
+        }
+    }
+
+    /// Frequencies beyond 0.05 to 60 cpd do not count, where the greatest sensitivity is at an end. Regression: the
+    /// search went on to 0.0448 and 67 cpd.
     #[test]
     fn peaks_are_looked_for_where_it_is_said() {
         struct Slope(f64);

@@ -1,4 +1,7 @@
-//! A static contrast sensitivity function set in motion.
+//! A static contrast sensitivity function set in motion by the ratios of Daly's spatiovelocity function (1998).
+//!
+//! For patterns that cross the retina as a whole. Not for flicker in place ([`super::CastleTemporal`]) nor for noise
+//! that is new in every frame ([`super::FreshNoise`]).
 
 use super::{ContrastSensitivity, Daly98};
 
@@ -7,7 +10,7 @@ use super::{ContrastSensitivity, Daly98};
 /// At rest (0.15 deg/s, the eye's drift) it equals the static function exactly; luminance and area stay the static
 /// function's.
 pub struct Moving<'a> {
-    /// The static function.
+    /// The static contrast sensitivity function that is set in motion.
     pub base: &'a dyn ContrastSensitivity,
     /// Velocity over the retina, deg/s.
     pub retinal_velocity_deg_s: f64,

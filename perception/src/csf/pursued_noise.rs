@@ -67,8 +67,8 @@ impl PursuedNoise {
         self.energy_left_of(channels, freq_cpd * velocity_deg_s)
     }
 
-    /// The same for sensitivities of the sustained and the transient channel, of noise that passes at so many Hz along its own
-    /// direction.
+    /// [`Self::energy_left`] for sensitivities of the sustained and the transient channel, of noise that passes at so
+    /// many Hz along its own direction.
     fn energy_left_of(&self, channels: [f64; 2], passing_hz: f64) -> f64 {
         let angle = |index: usize| FRAC_PI_2 * (index as f64 + 0.5) / ANGLES as f64;
         let at_angle = |index| self.energy(channels, passing_hz * angle(index).cos());

@@ -1,4 +1,6 @@
-//! stelaCSF.
+//! stelaCSF's sustained achromatic channel (Mantiuk, Ashraf and Chapiro 2022).
+//!
+//! For comparison with castleCSF, its successor: static gratings in the fovea. Not for motion, flicker or colour.
 
 use super::ContrastSensitivity;
 use super::castle::{Summation, Sustained};

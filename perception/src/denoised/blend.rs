@@ -31,12 +31,12 @@ pub(super) struct BandError {
 }
 
 impl BandError {
-    /// Of the denoised picture as it is.
+    /// The error of the denoised picture as it is.
     pub(super) fn of(evidence: &BandEvidence, found: &BandBias) -> Self {
         Self { variance: evidence.variance.clone(), bias: found.energy.clone(), uncertainty: found.uncertainty.clone() }
     }
 
-    /// The same once so much of the raw mean, with such noise, has taken the denoised picture's place.
+    /// This error once the share `share` of the raw mean, with its noise, has taken the denoised picture's place.
     pub(super) fn blended(self, share: &Plane, raw_noise: &Plane) -> Self {
         let kept = share.map(|share| (1.0 - share) * (1.0 - share));
         let of_raw = raw_noise.combined(share, |energy, share| energy * share * share);

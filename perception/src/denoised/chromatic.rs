@@ -10,16 +10,16 @@ use crate::threshold::chromatic_threshold_map;
 /// A denoised picture in one chromatic channel, on the display. Planes of one size.
 #[derive(Clone, Copy, Debug)]
 pub struct ChromaticPicture<'a> {
-    /// The channel's opponent signal, cd/m².
+    /// Opponent signal of the channel, cd/m².
     pub signal: &'a Plane,
-    /// Luminance, to which the eye adapts, cd/m².
+    /// Luminance to which the eye adapts, cd/m².
     pub luminance_cd_m2: &'a Plane,
-    /// Its errors' witnesses.
+    /// What the halves tell of the channel's error, cd/m².
     pub differences: DenoisedDifferences<'a>,
 }
 
-/// What can be seen of the picture's error in this channel, in which nothing moves it towards its raw mean. `frames`: of a moving picture, whose
-/// noise is new in every frame, and whose bias stays; `None` for stills.
+/// Visibility of a denoised picture's error in one chromatic channel, in which nothing moves it towards its raw mean.
+/// `frames`: timing of a moving picture, whose noise is new in every frame and whose bias stays; `None` for stills.
 ///
 /// # Errors
 /// As [`CastleChromatic::new`] and [`chromatic_threshold_map`], and for an impossible timing.

@@ -32,12 +32,12 @@ use witness::{BandEvidence, bias_energy};
 /// Errors of one channel of a denoised picture, display cd/m². Planes of the threshold map's size.
 #[derive(Clone, Copy, Debug)]
 pub struct DenoisedDifferences<'a> {
-    /// (dA − dB)/2 of the denoised halves.
+    /// Half the difference of the denoised halves: (dA − dB)/2.
     pub half_difference: &'a Plane,
-    /// d − M: denoised less raw mean. What turns it into display units must not bend: see
+    /// The denoised picture less the raw mean: d − M. What turns it into display units must not bend: see
     /// [`display_slope`](crate::seen::display_slope).
     pub residual: &'a Plane,
-    /// ((dA − A) − (dB − B))/2, by the same slope.
+    /// Half the difference of the halves' residuals, by the slope of `residual`: ((dA − A) − (dB − B))/2.
     pub residual_half_difference: &'a Plane,
 }
 
@@ -45,11 +45,11 @@ pub struct DenoisedDifferences<'a> {
 /// threshold units, as everywhere.
 #[derive(Clone, Debug)]
 pub struct DenoisedError {
-    /// v of variance and bias together: √(variance² + bias²).
+    /// Visibility v of variance and bias together: √(variance² + bias²).
     pub visibility: Plane,
-    /// v of the noise that is left, that which the raw mean brings among it.
+    /// Visibility v of the noise that is left, that which the raw mean brings among it.
     pub variance: Plane,
-    /// v of the bias: proven where the witness tells, by the factor elsewhere.
+    /// Visibility v of the bias: proven where the witness tells, by the factor elsewhere.
     pub bias: Plane,
     /// Standard error of `bias`² from the witness's noise: a bias of less than about two of these would not be noticed
     /// locally. 0 where the local bias is proven.
@@ -70,12 +70,12 @@ enum Blending {
 
 /// A bias that one-sided 95 % of witnesses would have noticed.
 const NOTICED: f32 = 1.645;
-/// A tile is visibly wrong above this many times what was asked for.
+/// How many times the visibility that was asked for a tile may have before it is visibly wrong.
 pub const VISIBLY_WRONG: f32 = 1.5;
 
 impl DenoisedError {
-    /// Of a picture of this size whose error nothing tells, such as one without independent halves: infinite everywhere, without
-    /// factors, and with nothing that is worth moving towards the raw mean.
+    /// The error of a picture of this size of which nothing tells it, such as one without independent halves: infinite
+    /// everywhere, without factors, and with nothing that is worth moving towards the raw mean.
     #[must_use]
     pub fn unknown(width: usize, height: usize) -> Self {
         let infinite = Plane::filled(width, height, f32::INFINITY);
@@ -152,7 +152,7 @@ impl DenoisedError {
         self.clone().scaled(|plane| plane.combined(factors, |value, factor| value / factor))
     }
 
-    /// The same error seen as many times as well as `scale` makes of a visibility.
+    /// This error seen as many times as well as `scale` makes of a visibility.
     fn scaled(mut self, scale: impl Fn(&Plane) -> Plane) -> Self {
         for plane in [&mut self.visibility, &mut self.variance, &mut self.bias] {
             *plane = scale(plane);

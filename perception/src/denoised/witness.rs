@@ -6,13 +6,15 @@ use crate::fft::Spectrum;
 use crate::plane::Plane;
 use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
 
-/// Squared bias over squared variance before anything is known of a picture: true error was 1.00 to 1.18 times what the
-/// halves' difference shows from 16 samples a pixel on, by a run of `fechner bench --suite denoise` whose table is not kept.
+/// Squared bias over squared variance before anything is known of a picture. Measured from 16 samples a pixel on: true
+/// error 1.00 to 1.18 times what the halves' difference shows (by a run of `fechner bench --suite denoise` whose table
+/// is not kept).
 const USUAL_FACTOR: f64 = 0.2;
-/// Its standard deviation between pictures.
+/// Standard deviation of the factor between pictures.
 const FACTOR_DEVIATION: f64 = 0.4;
 /// Standard errors above what the factor says from which a place's own witness begins to count, and from which it counts alone.
-/// Products of two normal values have long tails: at 3 and 5, raw noise of visibility 20 alone was taken for a bias of 1.8.
+/// Far out, since products of two normal values have long tails. Measured at 3 and 5: raw noise of visibility 20 alone
+/// is taken for a bias of 1.8.
 const BELIEVED_FROM: f32 = 5.0;
 const BELIEVED_FULLY: f32 = 8.0;
 /// Half the width of the window over which a band is pooled, in its own periods: a narrower one holds so few independent
@@ -23,13 +25,13 @@ const NORMAL_KURTOSIS: f32 = 3.0;
 
 /// Pooled energies of one band, squared threshold units.
 pub(super) struct BandEvidence {
-    /// Of the denoised halves' difference.
+    /// Energy of the denoised halves' difference.
     pub(super) variance: Plane,
-    /// Of the residual, less what noise puts into it: unbiased for the bias's, may be negative.
+    /// Energy of the residual, less what noise puts into it: unbiased for the bias's, may be negative.
     pub(super) witness: Plane,
     /// Variance of `witness` from the raw noise.
     pub(super) witness_variance: Plane,
-    /// Of the noise in the residual, which is nearly the raw mean's.
+    /// Energy of the noise in the residual, which is nearly the raw mean's.
     pub(super) raw_noise: Plane,
     /// Pixels that the pooling window holds: neighbours within it are no independent witnesses.
     window_pixels: f64,
@@ -85,8 +87,8 @@ impl BandEvidence {
 ///
 /// Along one axis the window g, at distance d from a mirror, weighs what is inside with g(u − d) + g(u + d), u > 0. The square's
 /// integral is that of g(u − d)² over the whole axis and of 2 g(u − d) g(u + d) over half of it: ∫ g² · (1 + exp(−d²/σ²)) for a
-/// Gaussian. Without it raw noise of visibility 4.0 alone was taken for a bias above 1 in 0.42 % of the pixels at edges and 2.0 %
-/// at corners; with it in 0.12 and 0.32 %.
+/// Gaussian. Measured on raw noise of visibility 4.0 alone, pixels where it is taken for a bias above 1: without this
+/// 0.42 % at edges and 2.0 % at corners, with it 0.12 and 0.32 %.
 fn repeat_at_borders(variance: &mut Plane, sigma_x_px: f64, sigma_y_px: f64) {
     let repetition = |index: usize, len: usize, sigma_px: f64| {
         let by_border = |pixels_between: usize| 1.0 + (-((pixels_between as f64 + 0.5) / sigma_px).powi(2)).exp();

@@ -29,11 +29,11 @@ struct DisplayFile {
 
 /// How a file says how many pixels a degree has.
 enum Density {
-    /// As its preset has it.
+    /// As the file's preset has it.
     Preset,
-    /// By the number.
+    /// By the number of pixels a degree itself.
     Stated(f64),
-    /// By the screen's geometry.
+    /// By the screen's width and distance.
     Follows { width_px: f64, width_m: f64, distance_m: f64 },
 }
 
@@ -159,7 +159,8 @@ mod tests {
         assert_eq!((phone.white_cd_m2, phone.pixels_per_degree), (700.0, 90.0));
     }
 
-    /// What is not the preset has not its name: messages said that "desktop" is not as bright as "desktop".
+    /// A display that is not the preset has not its name. Regression: messages said that "desktop" is not as bright as
+    /// "desktop".
     #[test]
     fn a_changed_preset_is_called_so() {
         let name = |text: &str| Display::from_toml(text).unwrap().name;

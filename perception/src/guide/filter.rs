@@ -34,7 +34,7 @@ fn falling(x: Vec4) -> Vec4 {
 }
 
 /// One pass over a 3×3 kernel whose taps lie `hole` pixels apart, at most [`BORDER`]. All taps of a few columns at once, so that
-/// sums stay in vector registers: tap by tap along whole rows it took three times the instructions.
+/// sums stay in vector registers: tap by tap along whole rows it takes three times the instructions.
 pub(super) fn filter_pass(
     light: &Rows<LIGHT_CHANNELS>,
     surfaces: &Rows<SURFACE_CHANNELS>,
@@ -101,7 +101,7 @@ impl View {
         Vec4::from_slice(&self.light[channel][at..at + LANES])
     }
 
-    /// The same of the surfaces.
+    /// A channel of the surfaces from the column `at` of the window on.
     #[inline(always)]
     fn surface(&self, channel: usize, at: usize) -> Vec4 {
         Vec4::from_slice(&self.surfaces[channel][at..at + LANES])
@@ -115,7 +115,7 @@ struct Scales {
 }
 
 impl Scales {
-    /// For whole groups of [`LANES`].
+    /// The scales of row `y`, for whole groups of [`LANES`].
     fn new(light: &Rows<LIGHT_CHANNELS>, surfaces: &Rows<SURFACE_CHANNELS>, hole: usize, y: usize) -> Self {
         let mut luminance = smoothed_variance(light, y);
         for (variance, own) in luminance.iter_mut().zip(light.row(y, LUMINANCE)) {
@@ -145,7 +145,7 @@ struct Centers {
 }
 
 impl Centers {
-    /// Those from column `at` of the window on, `column` of the picture.
+    /// The pixels from column `at` of the window on, `column` of the picture.
     #[inline(always)]
     fn new(own: &View, scales: &Scales, column: usize, at: usize) -> Self {
         let normal = [own.surface(NORMAL_X, at), own.surface(NORMAL_Y, at), own.surface(NORMAL_Z, at)];
@@ -185,7 +185,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// Of the middle tap alone.
+    /// Sums of the middle tap alone.
     #[inline(always)]
     fn new(centers: &Centers) -> Self {
         let own = TENT[1] * TENT[1];

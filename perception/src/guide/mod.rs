@@ -1,4 +1,6 @@
 //! The guide: a quickly denoised picture from which adaptation and masking are taken. It is never shown.
+//!
+//! Not for a picture that is to be kept: what is far above all around it is brought down, and that light is lost.
 
 mod filter;
 mod fireflies;
@@ -25,14 +27,15 @@ pub struct GuideInputs<'a> {
     pub variance: &'a Plane,
     /// Albedo of the first surface, 0..1.
     pub albedo: &'a [[f32; 3]],
-    /// Its normal, unit length, or 0 where there is none.
+    /// Normal of the first surface, of unit length, or 0 where there is none.
     pub normal: &'a [[f32; 3]],
-    /// Its distance, in any unit. Not finite where there is none, which is a neighbour of nothing else. A mean over samples of which some
-    /// met nothing, counted as 0, is fine as well: such pixels are told apart as surfaces that are nearer.
+    /// Distance of the first surface, in any unit. Not finite where there is none, which is a neighbour of nothing
+    /// else. A mean over samples of which some met nothing, counted as 0, is fine as well: such pixels are told apart
+    /// as surfaces that are nearer.
     pub depth: &'a [f32],
-    /// Columns.
+    /// Columns of the picture, pixels.
     pub width: usize,
-    /// Rows.
+    /// Rows of the picture, pixels.
     pub height: usize,
 }
 

@@ -7,7 +7,8 @@ use crate::rows::Rows;
 
 /// Stands for the depth where there is no surface.
 pub(super) const NO_DEPTH: f32 = 1e15;
-/// Surfaces farther away than this are taken to be here.
+/// Greatest depth, in the unit of [`GuideInputs::depth`](super::GuideInputs::depth): what is farther is taken to be
+/// here.
 pub const FARTHEST_SURFACE: f32 = 1e14;
 /// Depth beside the picture: so far from any other that what lies there never weighs anything.
 pub const BEYOND: f32 = 1e30;

@@ -1,4 +1,7 @@
-//! Bolin and Meyer.
+//! Bolin and Meyer's model of 1998, in its frame: Haar bands, each with its own sensitivity and its own masking.
+//!
+//! For comparison with adaptive sampling of its time. Not for guides with noise in them, which masks itself here, nor
+//! beside edges, which mask what lies next to them; it ignores motion and colour.
 
 use super::{ModelInputs, PerLuminance, ThresholdModel, finite_error, pooled};
 use crate::adaptation::adapted;

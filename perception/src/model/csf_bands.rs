@@ -1,4 +1,7 @@
-//! The default.
+//! The default model: octave bands under a contrast sensitivity function, each masked by its own contrast.
+//!
+//! For white noise of pixels in a still, and, given a velocity, for error that travels with what it lies on. Give no
+//! velocity for noise that is new in every frame, of which motion hides nothing.
 
 use super::{ModelInputs, ThresholdModel};
 use crate::error::Error;
@@ -41,7 +44,7 @@ pub(super) fn still(inputs: &ModelInputs<'_>) -> Result<ThresholdMap, Error> {
     threshold_map(&guide, inputs.viewing, inputs.csf)
 }
 
-/// The same, or that of what moves where a velocity is given.
+/// The threshold map of a still, or of what moves where a velocity is given.
 pub(super) fn still_or_moving(inputs: &ModelInputs<'_>) -> Result<ThresholdMap, Error> {
     let map = still(inputs)?;
     match inputs.retinal_velocity_deg_s() {

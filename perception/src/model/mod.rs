@@ -2,6 +2,9 @@
 //!
 //! All answer the same question, in the same unit: the standard error of a pixel's mean, in cd/m² on the display, at
 //! which its noise is just at threshold. They differ in what they take into account.
+//!
+//! What they allow is noise. Not for bias, which all samples share and no standard error holds, as a denoiser leaves it
+//! ([`crate::denoised`]).
 
 mod ablation;
 mod bolin_meyer;
@@ -22,6 +25,7 @@ use crate::csf::ContrastSensitivity;
 use crate::display::Viewing;
 use crate::error::Error;
 use crate::filter::gaussian_blur_xy;
+use crate::names::{NamedTable, find, names_of};
 use crate::plane::Plane;
 use crate::table::UniformTable;
 use crate::threshold::{GuideNoise, POOLING_SIGMA_DEG};
@@ -38,9 +42,9 @@ pub struct ModelInputs<'a> {
     pub image_velocity_deg_s: Option<&'a Plane>,
     /// How much each pixel attracts the gaze, 0..1 (see [`crate::saliency`]); `None` is 1: everything is followed.
     pub attention: Option<&'a Plane>,
-    /// Who looks from where.
+    /// The eye, the display and its distance.
     pub viewing: &'a Viewing,
-    /// Contrast sensitivity.
+    /// Contrast sensitivity function of the eye; not every model asks it ([`ThresholdModel::knows_csf`]).
     pub csf: &'a dyn ContrastSensitivity,
 }
 
@@ -74,7 +78,7 @@ impl ModelInputs<'_> {
 
 /// A rule for how much noise may remain.
 pub trait ThresholdModel: Send + Sync {
-    /// What the command line calls it.
+    /// The model's name on the command line.
     fn name(&self) -> &'static str;
 
     /// Standard error of the pixel's mean, cd/m² on the display, at which noise is at threshold. Finite and positive.
@@ -131,7 +135,21 @@ const Z_95: f64 = 1.96;
 /// Name of the model that is meant where none is named, and the only one that knows denoised pictures and where one looks.
 pub const DEFAULT: &str = "csf-bands";
 
-const NAMES: [&str; 7] = [DEFAULT, "ramasubramanian", "yee", "bolin-meyer", "tvi", "csf-unmasked", "tvi-masked"];
+/// Makes a model with its defaults.
+type Constructor = fn() -> Box<dyn ThresholdModel>;
+
+/// All models, in the order in which they are listed.
+const MODELS: NamedTable<Constructor, 7> = [
+    (DEFAULT, || Box::new(CsfBands)),
+    ("ramasubramanian", || Box::new(Ramasubramanian::default())),
+    ("yee", || Box::new(Yee::default())),
+    ("bolin-meyer", || Box::new(BolinMeyer)),
+    ("tvi", || Box::new(Tvi::default())),
+    ("csf-unmasked", || Box::new(Unmasked)),
+    ("tvi-masked", || Box::new(MaskedTvi)),
+];
+
+const NAMES: [&str; MODELS.len()] = names_of(&MODELS);
 
 /// The names that [`by_name`] knows; the first is [`DEFAULT`].
 #[must_use]
@@ -139,7 +157,7 @@ pub fn names() -> &'static [&'static str] {
     &NAMES
 }
 
-/// The model of that name, with its defaults.
+/// The threshold model of that name, with its defaults; `None` where there is none.
 ///
 /// ```
 /// use fechner_perception::model;
@@ -148,19 +166,10 @@ pub fn names() -> &'static [&'static str] {
 /// ```
 #[must_use]
 pub fn by_name(name: &str) -> Option<Box<dyn ThresholdModel>> {
-    Some(match name {
-        DEFAULT => Box::new(CsfBands),
-        "ramasubramanian" => Box::new(Ramasubramanian::default()),
-        "yee" => Box::new(Yee::default()),
-        "bolin-meyer" => Box::new(BolinMeyer),
-        "tvi" => Box::new(Tvi::default()),
-        "csf-unmasked" => Box::new(Unmasked),
-        "tvi-masked" => Box::new(MaskedTvi),
-        _ => return None,
-    })
+    find(&MODELS, name).map(|constructor| constructor())
 }
 
-/// [`by_name`], for names that somebody has given.
+/// The threshold model of a name that somebody has given: [`by_name`], with an error instead of `None`.
 ///
 /// # Errors
 /// [`Error::UnknownName`], which lists those that there are.

@@ -1,4 +1,7 @@
 //! Burt and Adelson's pyramid, undecimated, and what the models built on it share.
+//!
+//! For models as they were published. Not for new ones: weighted by contrast, what masks at an edge raises thresholds
+//! in the flat beside it.
 
 use super::{ModelInputs, PerLuminance, Z_95};
 use crate::adaptation::adapted;

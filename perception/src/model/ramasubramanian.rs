@@ -1,4 +1,8 @@
-//! Ramasubramanian, Pattanaik and Greenberg.
+//! Ramasubramanian, Pattanaik and Greenberg's threshold map of 1999: a threshold of luminance raised by spatial
+//! frequency and masking.
+//!
+//! For comparison with the literature. Not for guides with noise in them, which masks itself here, nor beside edges,
+//! from which it leaks into the flat; it ignores motion.
 
 use super::pyramid::{BANDS, band_frequency_cpd, contrast_weighted};
 use super::{ModelInputs, PerLuminance, ThresholdModel};
@@ -19,7 +23,7 @@ use crate::tvi::ThresholdBase;
 /// [`super::CsfBands`] does not.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ramasubramanian {
-    /// Start from the published TVI curve.
+    /// Whether thresholds start from the published TVI curve, not from `L_a` over the peak of contrast sensitivity.
     pub raw_tvi: bool,
 }
 

@@ -1,4 +1,7 @@
-//! Threshold versus intensity alone.
+//! Threshold versus intensity alone, by Ward Larson, Rushmeier and Piatko's curve (1997).
+//!
+//! For comparison. Not for noise of pixels: it is about large spots, in daylight 7 to 9 times too lenient unless
+//! lowered, and knows neither resolution nor texture nor motion.
 
 use super::{ModelInputs, PerLuminance, ThresholdModel, Z_95};
 use crate::adaptation::adapted;
@@ -13,7 +16,7 @@ use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 /// sensitivity, and it knows neither resolution nor texture nor motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tvi {
-    /// Lower the curve by 0.95 log units, to where contrast sensitivity puts it.
+    /// Whether the curve is lowered by 0.95 log units, to where contrast sensitivity puts it.
     pub shifted: bool,
 }
 

@@ -1,4 +1,7 @@
-//! Yee, Pattanaik and Greenberg.
+//! Yee, Pattanaik and Greenberg's Aleph map of 2001: a threshold of luminance raised by motion over the retina.
+//!
+//! For error that travels with what it lies on, in comparison with the literature. Not for noise that is new in every
+//! frame, of which motion hides nothing, nor where texture should mask: it has no masking.
 
 use super::pyramid::{BANDS, band_frequency_cpd, contrast_weighted};
 use super::{ModelInputs, PerLuminance, ThresholdModel};
@@ -16,9 +19,9 @@ use crate::tvi::ThresholdBase;
 /// `L_a` over the CSF's peak unless `raw_tvi` is set; elevations are computed in logs. The paper has no masking and neither has this.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Yee {
-    /// Start from the published TVI curve.
+    /// Whether thresholds start from the published TVI curve, not from `L_a` over the peak of contrast sensitivity.
     pub raw_tvi: bool,
-    /// Greatest elevation of a band.
+    /// How many times a band's threshold may be raised at most; below 1 counts as 1.
     pub most_elevation: f64,
 }
 
@@ -29,7 +32,8 @@ impl Default for Yee {
 }
 
 impl Yee {
-    /// `f_i`, the elevation of a frequency by motion, capped.
+    /// How many times motion raises the threshold of a frequency, `f_i`: 1 up to the peak of Daly's function, at most
+    /// [`Self::most_elevation`].
     #[must_use]
     pub fn elevation(&self, freq_cpd: f64, retinal_velocity_deg_s: f64) -> f64 {
         let csf = Daly98 { retinal_velocity_deg_s };

@@ -18,9 +18,10 @@ static TINTS: LazyLock<[[f64; 3]; 2]> = LazyLock::new(|| {
 /// chromatic signals have the variances `of_tints`: what noise of its luminance makes of it, and what is not that, tints that come and go
 /// beside it. Noise of luminance is of the colour as far as there is noise of tints to go with it, and of grey as to the rest.
 ///
-/// Of a blue wall under a white lamp nearly all noise of colour is noise of luminance. Where its blue is clipped hardly any of it shows; as
-/// tints of a grey as bright as it was shown it was told as 2 to 7 times what was seen. Of a red lamp under a white one all of the noise is
-/// grey, and shows in green and blue alone.
+/// The colour itself is asked, since clips are its channels': of a blue wall under a white lamp nearly all noise of
+/// colour is noise of luminance, and where its blue is clipped hardly any of it shows. Taken as tints of a grey as
+/// bright as it is shown, its noise is predicted as 2 to 7 times what is seen. Of a red lamp under a white one all of
+/// the noise is grey, and shows in green and blue alone.
 pub(super) fn variances_of_colour(
     shown: &Shown<'_>,
     pixel: Pixel,

@@ -12,8 +12,8 @@ const FARTHEST: f64 = 4.0;
 /// Points of normal noise on either side of the mean.
 const STEPS: usize = 10;
 
-/// Deviations of normal noise and what they weigh: the midpoint rule. Once for all pixels, whose exponentials were a twelfth of the time
-/// that noise on the display took.
+/// Deviations of normal noise and what they weigh: the midpoint rule. Made once for all pixels: exponentials for each
+/// would be a twelfth of the time that noise on the display takes.
 static NORMAL_POINTS: LazyLock<[(f64, f64); 2 * STEPS + 1]> = LazyLock::new(|| {
     std::array::from_fn(|step| {
         let deviations = FARTHEST * (step as f64 - STEPS as f64) / STEPS as f64;
@@ -59,8 +59,8 @@ impl Shown<'_> {
         NoisyPixel { shown: self, pixel, noise, hue: None, points }
     }
 
-    /// The same of a colour, `hue` at a luminance of 1 cd/m², that the operator shows as something else than a grey of its luminance; and what
-    /// its three points show.
+    /// A pixel with noisy light of a colour, `hue` at a luminance of 1 cd/m², that the operator shows as something else
+    /// than a grey of its luminance; and what its three points show.
     pub(super) fn coloured_pixel(
         &self,
         pixel: Pixel,
@@ -114,9 +114,9 @@ impl Shown<'_> {
 /// A pixel's scene luminance.
 #[derive(Clone, Copy)]
 pub(super) struct Noise {
-    /// cd/m², at least 0.
+    /// Mean of the light, cd/m², at least 0.
     pub(super) mean: f64,
-    /// Of the mean, (cd/m²)², at least 0.
+    /// Variance of that mean, (cd/m²)², at least 0.
     pub(super) variance: f64,
 }
 
@@ -234,8 +234,9 @@ impl NoisyPixel<'_> {
     }
 
     /// How much of the variances of both chromatic signals, `unbounded` (cd/m²)², fits the display: at most the square of the room that each
-    /// luminance leaves for a tint. `rooms_cd_m2`: of black. Nothing is taken off where few samples bring the light: of a caustic at 2.5 times
-    /// white most pixels are below it, and three points that say one in five left a third of what showed.
+    /// luminance leaves for a tint. `rooms_cd_m2`: of black. Nothing is taken off where few samples bring the light: of
+    /// a caustic at 2.5 times white most pixels are below white. Measured there: three points, which say that one in
+    /// five is below, leave a third of what shows.
     pub(super) fn within_rooms(&self, unbounded: [f32; 2], rooms_cd_m2: [f64; 2]) -> [f32; 2] {
         let fits = |relative: f32| -> [f64; 2] {
             let share = f64::from((1.0 - relative).max(0.0));

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 pub struct FrameMotion {
     /// Where each pixel's content will be one frame later, less where it is.
     pub to_next: [Plane; 2],
-    /// Where it was one frame earlier, less where it is.
+    /// Where each pixel's content was one frame earlier, less where it is.
     pub to_previous: [Plane; 2],
 }
 
@@ -77,7 +77,7 @@ const MOST_TAPS: f32 = 64.0;
 /// Pixels from a pixel's centre to its border.
 const WITHIN_PIXEL: f32 = 0.5;
 
-/// For half a smear of so many pixels.
+/// Places that half a smear of `length` pixels is summed over.
 fn taps(length: f32) -> f32 {
     if length <= WITHIN_PIXEL { 1.0 } else { (LEAST_TAPS + TAPS_A_PIXEL * length).min(MOST_TAPS).ceil() }
 }

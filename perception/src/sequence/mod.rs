@@ -43,7 +43,7 @@ pub struct SequenceFrame {
 }
 
 impl SequenceFrame {
-    /// Takes displayed colours, linear Rec. 709 RGB in cd/m², row-major. Without motion the eye rests.
+    /// A frame of displayed colours, linear Rec. 709 RGB in cd/m², row-major. Without motion the eye rests.
     ///
     /// # Errors
     /// [`Error::ValueCount`] unless both pictures have `width * height` pixels, [`Error::Empty`] without pixels,
@@ -92,7 +92,7 @@ struct Light {
 #[derive(Clone, Copy, Default)]
 struct Seen {
     sustained: [f32; 3],
-    /// Of luminance, in the transient channel.
+    /// Difference of luminance in the transient channel.
     transient: f32,
 }
 
@@ -113,8 +113,8 @@ struct Filters<'a> {
 }
 
 impl SequenceObserver {
-    /// In front of a display that shows `viewing.display.frames_per_second` new frames a second, each lit for its
-    /// `persistence`.
+    /// An observer in front of a display that shows `viewing.display.frames_per_second` new frames a second, each lit
+    /// for its `persistence`.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for an impossible viewing.
@@ -125,7 +125,7 @@ impl SequenceObserver {
         Ok(Self { viewing: viewing.clone(), responses: FrameResponses::new(timing)? })
     }
 
-    /// How many frames before and after one have to do with it.
+    /// How many frames before a frame, and as many after it, have a part in how it is seen.
     #[must_use]
     pub fn reach(&self) -> usize {
         self.responses.reach()
@@ -276,8 +276,10 @@ impl SequenceObserver {
             threshold_map(&inputs, &self.viewing, &csf)
         };
         let achromatic = masked_by_both(map_of(&reference)?, &map_of(&test)?);
-        // The transient channel of an eye adapted to a dark shot holds as much of a bright one 0.2 s away as of the frame that is shown, which is
-        // not seen against the dark alone: an error of 2 % on 950 cd/m² had 3.5 in equal dark frames before the cut, 0.9 in its own.
+        // Flicker is judged under the brightest light that any channel holds: the transient channel of an eye adapted
+        // to a dark shot holds as much of a bright one 0.2 s away as of the frame that is shown, and that is not seen
+        // against the dark alone. Measured against the dark alone on an error of 2 % on 950 cd/m²: visibility 3.5 in
+        // equal dark frames before the cut, 0.9 in its own.
         let brightest = plane(&|light| light.reference[0].max(light.around));
         let adaptation_cd_m2 = adapted(&brightest, &self.viewing);
         let (least, greatest) = adaptation_cd_m2.range();
@@ -321,7 +323,7 @@ impl<'a> Filters<'a> {
         raise(greatest, &visibility);
     }
 
-    /// The same for colours.
+    /// Raises a visibility to that of colours at one moment where it is greater.
     fn add_chromatic(&mut self, greatest: &mut Plane, seen: &SeenPlanes) {
         let [_, red_green, yellow_violet] = &seen.sustained;
         raise(greatest, &self.red_green.visibility(red_green));

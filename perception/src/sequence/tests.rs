@@ -273,8 +273,8 @@ fn colours_are_seen_alike_before_and_after() {
     }
 }
 
-/// An error of a bright shot is not seen much better in the dark one before it than in its own frames: against the dark shot's light it
-/// had 4 times the visibility there.
+/// An error of a bright shot is not seen much better in the dark one before it than in its own frames. Regression:
+/// against the dark shot's light alone it had 4 times the visibility there.
 #[test]
 fn the_dark_beside_a_bright_shot_is_seen_by_its_light() {
     let blob = |x: usize, y: usize| (-((x as f32 - 48.0).powi(2) + (y as f32 - 48.0).powi(2)) / 32.0).exp();

@@ -199,7 +199,7 @@ fn any_size_and_luminance_gives_finite_thresholds() {
     }
 }
 
-/// Thresholds that no number holds were infinite.
+/// Regression: where no `f32` holds a threshold it was infinite, and no error.
 #[test]
 fn luminance_without_an_answer_is_an_error() {
     let ask = |luminance: f32| {

@@ -1,4 +1,7 @@
-//! Shows the scene's own luminances.
+//! Shows the scene's own luminances, as far as the display reaches.
+//!
+//! For pictures that are display-referred already, and to see a scene as through a window. Not for scenes that are much
+//! brighter or darker than the display: what it cannot reach is clipped.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,7 @@
 //! Fine detail that an eye in dim light does not resolve, taken out of the picture for one in front of a bright display.
+//!
+//! By Shlaer's data in Ward Larson, Rushmeier and Piatko's fit (1997), for one adaptation luminance. Not for views
+//! whose parts are adapted to by themselves: the blur is one for all.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,15 +11,15 @@ use crate::filter::sampled_gaussian_blur_xy;
 use crate::plane::Plane;
 use crate::tvi::acuity_cpd;
 
-/// A Gaussian over the picture.
+/// Loss of acuity of an eye in dim light: a Gaussian over the picture.
 ///
 /// At the highest frequency r that the scene's eye resolves ([`acuity_cpd`], Shlaer's data) it lets through just the
 /// contrast that the display's eye detects there, 1/S(r) of castleCSF: what the one cannot see, the other cannot either.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AcuityFilter {
-    /// Standard deviation, degrees.
+    /// Standard deviation of the Gaussian, degrees.
     pub sigma_deg: f64,
-    /// Of the display.
+    /// Pixels a degree of the display that the picture is shown on.
     pub pixel_density: PixelDensity,
 }
 
@@ -46,7 +49,7 @@ impl AcuityFilter {
         (-0.5 * phase * phase).exp()
     }
 
-    /// One channel through the filter.
+    /// A plane of one channel, in any unit, through the filter.
     #[must_use]
     pub fn blur_plane(&self, plane: &Plane) -> Plane {
         sampled_gaussian_blur_xy(plane, self.pixel_density.pixels(self.sigma_deg))
@@ -71,9 +74,9 @@ impl AcuityFilter {
 /// A contrast sensitivity function behind a loss of acuity: how scene noise is seen that the operator blurs. Thresholds
 /// built with it hold for the noise as it is rendered, and of the picture as it is rendered: what masks is blurred, too.
 pub struct BehindAcuity<C> {
-    /// The eye in front of the display.
+    /// Contrast sensitivity function of the eye in front of the display.
     pub csf: C,
-    /// What the operator takes away, if it does.
+    /// Loss of acuity that the operator simulates; `None` where it takes nothing away.
     pub acuity: Option<AcuityFilter>,
 }
 

@@ -1,4 +1,7 @@
-//! AgX.
+//! AgX, Troy Sobotka's film-like operator as Blender 4 ships it.
+//!
+//! For pictures that are to look filmed. Not for what an eye would see: it knows neither adaptation nor the display's
+//! luminance, and bends each channel by itself, so that what becomes of luminance depends on the colour.
 
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
@@ -72,8 +75,8 @@ impl Sigmoid {
     }
 }
 
-/// Display light of a channel for 0..1 of its stops, at equal steps. Three powers for each channel made looks at noise twice as long; between
-/// steps a straight line is off by 2e-7 at most.
+/// Display light of a channel for 0..1 of its stops, at equal steps, between which a straight line is off by 2e-7 at
+/// most. Three powers for each channel instead make looks at noise twice as long.
 static CURVE: LazyLock<[f64; STEPS + 1]> = LazyLock::new(|| {
     let sigmoid = Sigmoid::new();
     std::array::from_fn(|step| sigmoid.at(step as f64 / STEPS as f64).clamp(0.0, 1.0).powf(GAMMA))

@@ -1,4 +1,7 @@
 //! What image viewers do: scale, and clip each channel for itself.
+//!
+//! For comparison with such viewers. Not for bright colours, which change hue where a channel clips, and not for what
+//! an eye would see: adaptation is ignored.
 
 use serde::{Deserialize, Serialize};
 

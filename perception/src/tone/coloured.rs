@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// what `fitted` does, which is given back as it is where it keeps luminance ([`FittedTone::keeps_luminance`]).
 ///
 /// For what works on planes of luminance ([`crate::seen`]). A blue wall at three times the display's white has `srgb`'s red and green
-/// far below their clip, and noise in them shows; told as a grey's, none of it does.
+/// far below their clip, and noise in them shows; predicted as a grey's, none of it does.
 #[must_use]
 pub fn coloured(fitted: Box<dyn FittedTone>, width: usize, rgb: &[[f32; 3]]) -> Box<dyn FittedTone> {
     if fitted.keeps_luminance() {

@@ -1,4 +1,7 @@
-//! One exposure for the whole picture.
+//! One exposure for the whole picture, as a camera has it.
+//!
+//! For pictures that a camera might have taken, in which ratios of light are kept. Not for scenes of more range than
+//! the display's, whose lights or shadows are lost, and not for what an eye would see: adaptation is ignored.
 
 use super::scale::Scale;
 use super::statistics::SceneStatistics;
@@ -26,7 +29,7 @@ pub enum Exposure {
 pub struct Constant {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the exposure aims at.
+    /// Which pixels are exposed for.
     pub time: Exposure,
 }
 

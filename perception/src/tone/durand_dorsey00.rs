@@ -1,4 +1,7 @@
-//! Durand and Dorsey's interactive operator.
+//! Durand and Dorsey's interactive operator, 2000: rods and cones that adapt over time.
+//!
+//! For walks through dim scenes. Not as a reference of the paper: its text could not be had, and its chromatic
+//! adaptation and flare are left out.
 
 use super::duplex::{DuplexLaw, FittedDuplex, RodWeight, adapted};
 use super::field::{AdaptationScope, LocalAdaptation};
@@ -16,7 +19,7 @@ use crate::photometry::luminance;
 pub struct DurandDorsey00 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the eye is adapted to.
+    /// Whether the eye is adapted to the view as a whole or to each place.
     pub scope: AdaptationScope,
 }
 

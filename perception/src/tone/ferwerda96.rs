@@ -1,4 +1,7 @@
-//! Ferwerda, Pattanaik, Shirley and Greenberg's operator of rods and cones.
+//! Ferwerda, Pattanaik, Shirley and Greenberg's operator of rods and cones, 1996.
+//!
+//! For dim scenes and what is just visible in them. Not for scenes of more range than the display's: light is scaled,
+//! and what is too bright is clipped. Acuity is that of the whole view.
 
 use super::acuity::AcuityFilter;
 use super::duplex::{DuplexLaw, FittedDuplex, RodWeight, adapted};
@@ -17,7 +20,7 @@ use crate::display::Viewing;
 pub struct Ferwerda96 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the eye is adapted to.
+    /// Whether the eye is adapted to the view as a whole or to each place.
     pub scope: AdaptationScope,
     /// Whether fine detail is lost in dim light.
     pub acuity: bool,

@@ -1,4 +1,7 @@
 //! Colours that a display can show.
+//!
+//! By mixing with grey, which keeps luminance and hue. Not for operators that clip each channel on purpose (`linear`,
+//! `srgb`).
 
 use crate::photometry::luminance;
 

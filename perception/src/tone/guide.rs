@@ -5,9 +5,9 @@ use crate::plane::Plane;
 /// A pixel of a picture: column and row from the top left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pixel {
-    /// Column.
+    /// Column, 0 at the left.
     pub x: usize,
-    /// Row.
+    /// Row, 0 at the top.
     pub y: usize,
 }
 
@@ -21,8 +21,9 @@ impl Pixel {
 pub struct SceneGuide<'a> {
     /// Scene luminance of the denoised guide, cd/m²; NaN where nothing is, neither light nor darkness.
     pub luminance_cd_m2: &'a Plane,
-    /// The same as the rods see it ([`scotopic_luminance`](crate::photometry::scotopic_luminance)); the photopic luminance stands in where it is not given or
-    /// has another size.
+    /// Scene luminance of the guide as the rods see it, cd/m²
+    /// ([`scotopic_luminance`](crate::photometry::scotopic_luminance)); the photopic luminance stands in where it is
+    /// not given or has another size.
     pub scotopic_cd_m2: Option<&'a Plane>,
     /// Where the eye looks. Adaptation then comes from there and not from the picture as a whole.
     pub gaze: Option<Pixel>,
@@ -35,7 +36,7 @@ impl<'a> SceneGuide<'a> {
         Self { luminance_cd_m2, scotopic_cd_m2: None, gaze: None }
     }
 
-    /// The same with the eye on one pixel.
+    /// This guide with the eye on one pixel; `None` for an eye that looks all over.
     #[must_use]
     pub fn with_gaze(self, gaze: Option<Pixel>) -> Self {
         Self { gaze, ..self }

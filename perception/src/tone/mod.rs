@@ -81,7 +81,7 @@ use acuity::AcuityFilter;
 ///
 /// One of your own can choose among this crate's fits, by what it sees of the guide; fits of another kind cannot be made ([`FittedTone`]).
 pub trait ToneOperator: Send + Sync + Debug {
-    /// What the command line calls it.
+    /// The operator's name on the command line.
     fn name(&self) -> &'static str;
 
     /// Freezes the operator for one picture, its observer, and, where time passes, what the observer's eyes are adapted to;
@@ -148,7 +148,8 @@ pub trait FittedTone: Send + Sync + Debug {
     /// The fit as numbers.
     fn save(&self) -> SavedTone;
 
-    /// The same for an eye that is adapted to the view as a whole.
+    /// Linear display light for a grey of scene luminance `scene_cd_m2`, cd/m², of an eye that is adapted to the view
+    /// as a whole: [`relative_luminance_at`](Self::relative_luminance_at) [`Pixel::NOWHERE`].
     fn relative_luminance(&self, scene_cd_m2: f32) -> f32 {
         self.relative_luminance_at(Pixel::NOWHERE, scene_cd_m2)
     }
@@ -164,7 +165,8 @@ pub trait FittedTone: Send + Sync + Debug {
         gamut::with_luminance(rgb, scene, self.relative_luminance_at(pixel, scene))
     }
 
-    /// The same for an eye that is adapted to the view as a whole.
+    /// Linear display RGB in 0..1 for scene RGB in cd/m², of an eye that is adapted to the view as a whole:
+    /// [`map_rgb_at`](Self::map_rgb_at) [`Pixel::NOWHERE`].
     fn map_rgb(&self, rgb_cd_m2: [f32; 3]) -> [f32; 3] {
         self.map_rgb_at(Pixel::NOWHERE, rgb_cd_m2)
     }

@@ -1,4 +1,7 @@
-//! Pattanaik, Tumblin, Yee and Greenberg's time-dependent visual model.
+//! Pattanaik, Tumblin, Yee and Greenberg's time-dependent visual model, 2000.
+//!
+//! For eyes that come from the dark or from the light, with a state of adaptation. Not for detail that dim light hides,
+//! which it shows: no acuity is lost. Without a state the eye is adapted to the picture.
 
 use std::sync::LazyLock;
 
@@ -27,14 +30,14 @@ use crate::photometry::{luminance, scotopic_luminance};
 pub struct Pattanaik00 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the eye is adapted to. With [`AdaptationScope::Local`] responses are local, reference white and black those of
-    /// the view.
+    /// Whether the eye is adapted to the view as a whole or to each place. With [`AdaptationScope::Local`] responses
+    /// are local, reference white and black those of the view.
     pub scope: AdaptationScope,
 }
 
 /// Exponent of the response.
 const POWER: f64 = 0.73;
-/// Light to the power of the response, and back: half of an operator's time was `powf`.
+/// Light to the power of the response, and back, by tables: `powf` would be half of the operator's time.
 static RAISED: LazyLock<FixedPower> = LazyLock::new(|| FixedPower::new(POWER));
 static LOWERED: LazyLock<FixedPower> = LazyLock::new(|| FixedPower::new(POWER.recip()));
 const WHITE_FACTOR: f64 = 5.0;

@@ -1,4 +1,7 @@
-//! The Khronos group's PBR Neutral.
+//! The Khronos group's PBR Neutral, 2024.
+//!
+//! For surfaces whose colours are to be recognised. Not for what an eye would see: it knows neither adaptation nor the
+//! display's luminance, and what becomes of luminance depends on the colour.
 
 use serde::{Deserialize, Serialize};
 

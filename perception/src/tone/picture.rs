@@ -14,7 +14,8 @@ pub fn map_picture(fitted: &dyn FittedTone, width: usize, rgb_cd_m2: &[[f32; 3]]
     }
 }
 
-/// The same without the loss of acuity, each pixel for itself: for noise that is judged behind it
+/// Linear display RGB in 0..1 for a picture in scene cd/m², row by row, `width` pixels wide, each pixel for itself:
+/// [`map_picture`] without the loss of acuity, for noise that is judged behind it
 /// ([`BehindAcuity`](super::acuity::BehindAcuity)).
 #[must_use]
 pub fn map_pixels(fitted: &dyn FittedTone, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Vec<[f32; 3]> {

@@ -1,4 +1,7 @@
-//! Reinhard, Stark, Shirley and Ferwerda's photographic operator.
+//! Reinhard, Stark, Shirley and Ferwerda's photographic operator, 2002.
+//!
+//! For pictures of which no unit is known, since only ratios count. Not for what an eye would see: a moonlit scene is
+//! shown as bright as a sunlit one.
 
 use serde::{Deserialize, Serialize};
 

@@ -44,7 +44,7 @@ pub(super) enum Fit {
 }
 
 impl SavedTone {
-    /// The operator that was saved.
+    /// The fitted operator that was saved.
     #[must_use]
     pub fn restore(self) -> Box<dyn FittedTone> {
         match self.0 {

@@ -9,7 +9,7 @@ use crate::plane::Plane;
 pub struct SceneLight {
     photopic_cd_m2: Plane,
     scotopic_cd_m2: Option<Plane>,
-    /// The same of what covers each pixel, where that is not all of all.
+    /// Light of what covers each pixel, where not all are covered whole.
     covering: Option<Covering>,
 }
 
@@ -21,7 +21,8 @@ struct Covering {
 }
 
 impl SceneLight {
-    /// Of linear RGB in cd/m², row by row, `width` pixels wide. Negative light and what is not finite counts as black.
+    /// Light of a picture in linear Rec. 709 RGB, cd/m², row by row, `width` pixels wide, with the rods' where
+    /// `operator` asks for it. Negative light and what is not finite counts as black.
     ///
     /// ```
     /// use fechner_perception::tone::{SceneLight, operator};
@@ -36,15 +37,15 @@ impl SceneLight {
         Self { photopic_cd_m2: plane(width, rgb_cd_m2, luminance), scotopic_cd_m2, covering: None }
     }
 
-    /// The same for whatever operator may come.
+    /// Light of such a picture for whatever operator may come: the rods' in any case.
     #[must_use]
     pub fn with_rods(width: usize, rgb_cd_m2: &[[f32; 3]]) -> Self {
         let scotopic_cd_m2 = Some(plane(width, rgb_cd_m2, scotopic_luminance));
         Self { photopic_cd_m2: plane(width, rgb_cd_m2, luminance), scotopic_cd_m2, covering: None }
     }
 
-    /// The same of a picture that covers of each pixel this share, 0 to 1, and whose light is multiplied by it. What is not there is no
-    /// darkness to adapt to. An alpha of another size is not looked at.
+    /// This light as that of a picture that covers the share `alpha` of each pixel, 0 to 1, and whose light is
+    /// multiplied by it. What is not there is no darkness to adapt to. An alpha of another size is not looked at.
     ///
     /// ```
     /// use fechner_perception::tone::{SceneLight, operator};
@@ -98,13 +99,14 @@ impl SceneLight {
         Self { photopic_cd_m2, scotopic_cd_m2, covering }
     }
 
-    /// For [`ToneOperator::fit`], all of it.
+    /// A guide for [`ToneOperator::fit`] that holds all of the picture.
     #[must_use]
     pub fn guide(&self) -> SceneGuide<'_> {
         guide_of(self.all())
     }
 
-    /// The same for one operator: what the picture does not cover is left out where it would be taken for darkness.
+    /// A guide for [`ToneOperator::fit`] of one operator: what the picture does not cover is left out where it would be
+    /// taken for darkness.
     #[must_use]
     pub fn guide_for(&self, operator: &dyn ToneOperator) -> SceneGuide<'_> {
         guide_of(if operator.counts_darkness() { self.there() } else { self.all() })

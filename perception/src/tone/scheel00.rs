@@ -1,4 +1,7 @@
-//! Scheel, Stamminger and Seidel's operator for walkthroughs.
+//! Scheel, Stamminger and Seidel's operator for walkthroughs, 2000.
+//!
+//! For frames of a walk, whose centre decides. Not for pictures that are looked at all over, and not as a reference of
+//! the paper: its text could not be had.
 
 use super::scale::Scale;
 use super::statistics::{as_eyes_see, log_average_to_eyes};
@@ -31,7 +34,7 @@ impl ToneOperator for Scheel00 {
         true
     }
 
-    /// Of the centre-weighted points, over time too.
+    /// The goal of the centre-weighted points, over time too.
     fn goal(&self, guide: &SceneGuide<'_>, density: PixelDensity) -> Goal {
         let view = Goal::of(guide, density);
         let of_points =

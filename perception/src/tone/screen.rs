@@ -9,7 +9,7 @@ use crate::display::Display;
 pub(super) struct Screen {
     /// Black and ambient light, cd/m²: what it cannot help showing.
     pub(super) black_cd_m2: f64,
-    /// From there to white, cd/m².
+    /// What it shows more for white, cd/m².
     pub(super) span_cd_m2: f64,
 }
 
@@ -19,7 +19,7 @@ impl Screen {
         Self { black_cd_m2, span_cd_m2: (display.luminance_cd_m2(1.0) - black_cd_m2).max(f64::MIN_POSITIVE) }
     }
 
-    /// Without what it reflects of the room.
+    /// A display's own light, without what it reflects of the room.
     pub(super) fn emitting(display: &Display) -> Self {
         let black_cd_m2 = display.emitted_cd_m2(0.0);
         Self { black_cd_m2, span_cd_m2: (display.emitted_cd_m2(1.0) - black_cd_m2).max(f64::MIN_POSITIVE) }
@@ -34,7 +34,7 @@ impl Screen {
         finite((shown_cd_m2 - self.black_cd_m2) / self.span_cd_m2)
     }
 
-    /// The same of one channel of a colour: less than 0 below black, NaN for NaN.
+    /// The light of one channel of a colour that shows this: less than 0 below black, NaN for NaN.
     pub(super) fn channel(self, shown_cd_m2: f64) -> f32 {
         ((shown_cd_m2 - self.black_cd_m2) / self.span_cd_m2) as f32
     }

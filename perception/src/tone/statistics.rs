@@ -19,7 +19,7 @@ const DARKEST_SHARE: f32 = 1e-6;
 /// Share of the picture's pixels that are too few to make all others darkness: fireflies, the disc of the sun. More of them, 20 stops
 /// above everything else, hold 99.9 % of the light and are what there is to see.
 const TOO_FEW: f64 = 1e-3;
-/// The same in pixels, for small pictures: a firefly, or a pair with its neighbours.
+/// Pixels of a small picture that are too few in any case: a firefly, or a pair with its neighbours.
 const TOO_FEW_PIXELS: usize = 4;
 
 /// What an eye makes of a pixel: less than the floor of vision is as dark as the floor. `None` for what is no light.
@@ -60,7 +60,7 @@ pub(super) fn weighted_log_average_to_eyes(
 }
 
 /// Geometric mean of the pixels that are lit, whatever the unit; `None` for a black picture. Pixels too few to count
-/// ([`TOO_FEW`]) make no others darkness: one of 1e12 took all the rest for it.
+/// ([`TOO_FEW`]) make no others darkness: beside a single one of 1e12 all the rest would be.
 pub(super) fn log_average_of_lit(luminance: &Plane) -> Option<f64> {
     let sorted = sorted_lit(luminance);
     let brightest = enough_of_the_brightest(&sorted, luminance.values().len()).last();
@@ -141,7 +141,8 @@ impl SceneStatistics {
 ///
 /// What may be exposed for lies within 20 stops of the brightest pixel, and where that is [`TOO_FEW`] pixels, of the brightest
 /// below them. A quantile of all that is lit would not do: it is leaked light itself wherever a leaking background is
-/// most of the picture, and 4.8 % of it at 20 to 100 cd/m² before 1e-6 were exposed 4e7 times as long as 5.3 %.
+/// most of the picture. Measured with such a quantile, pixels of 20 to 100 cd/m² before a background of 1e-6: where
+/// they are 4.8 % of the picture they are exposed 4e7 times as long as where they are 5.3 %.
 fn floor_cd_m2(sorted_cd_m2: &[f32], pixel_count: usize) -> f32 {
     DARKEST_SHARE * quantile(enough_of_the_brightest(sorted_cd_m2, pixel_count), ORDINARY).unwrap_or(0.0)
 }

@@ -1,6 +1,9 @@
 //! Eyes that adapt over time: neural adaptation and bleaching of cones and rods, carried from frame to frame.
 //!
 //! There is one state a view. It belongs to the eye and not to what is seen, so it is never reprojected with surfaces.
+//!
+//! After Pattanaik, Tumblin, Yee and Greenberg 2000. Not for the pupil's size or for chromatic adaptation, which are
+//! left out.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,9 +14,9 @@ use crate::display::PixelDensity;
 /// The luminances, cd/m², that cones and rods would adapt to if the view stayed as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Goal {
-    /// Photopic.
+    /// Photopic luminance that cones would adapt to, cd/m².
     pub cones_cd_m2: f64,
-    /// Scotopic, where known.
+    /// Scotopic luminance that rods would adapt to, cd/m²; the photopic one where it is not known.
     pub rods_cd_m2: f64,
 }
 
@@ -22,7 +25,7 @@ pub struct Goal {
 const GAZE_SIGMA_DEG: f64 = 5.0;
 
 impl Goal {
-    /// The same for cones and rods.
+    /// One luminance, cd/m², for cones and rods.
     #[must_use]
     pub fn both(luminance_cd_m2: f64) -> Self {
         Self { cones_cd_m2: luminance_cd_m2, rods_cd_m2: luminance_cd_m2 }
@@ -79,9 +82,9 @@ impl ReceptorKinetics {
 /// How fast an eye adapts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kinetics {
-    /// Cones.
+    /// How fast the cones adapt.
     pub cones: ReceptorKinetics,
-    /// Rods.
+    /// How fast the rods adapt.
     pub rods: ReceptorKinetics,
 }
 
@@ -111,11 +114,11 @@ pub struct ReceptorState {
 /// What an eye is adapted to at one moment; made of numbers, to be saved with a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AdaptationState {
-    /// Cones.
+    /// What the cones are adapted to.
     pub cones: ReceptorState,
-    /// Rods.
+    /// What the rods are adapted to.
     pub rods: ReceptorState,
-    /// What was in view last.
+    /// The luminances that were in view last.
     pub goal: Goal,
 }
 

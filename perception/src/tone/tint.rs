@@ -8,7 +8,7 @@ use crate::photometry::REC709_WEIGHTS;
 /// Two tints without luminance: red for green, and blue for green.
 const TINTS: [[f32; 3]; 2] =
     [[1.0, -REC709_WEIGHTS[0] / REC709_WEIGHTS[1], 0.0], [0.0, -REC709_WEIGHTS[2] / REC709_WEIGHTS[1], 1.0]];
-/// Of the grey that is tinted.
+/// Strength of the tint, over the grey that is tinted.
 const STRENGTH: f32 = 0.02;
 
 /// Chromatic signals of display light over those of the scene, cd/m², that make a faint tint on a grey of this luminance: the

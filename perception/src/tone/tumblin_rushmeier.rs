@@ -1,4 +1,7 @@
-//! Tumblin and Rushmeier's brightness-preserving operator.
+//! Tumblin and Rushmeier's brightness-preserving operator, 1993.
+//!
+//! For daylight and lamplight as bright as they seem. Not for thresholds, which it does not keep, and not for night:
+//! the law's exponent would turn negative, so adaptation is held at 0.001 cd/m².
 
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +24,7 @@ use crate::display::Viewing;
 pub struct TumblinRushmeier {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the eye is adapted to.
+    /// Whether the eye is adapted to the view as a whole or to each place.
     pub scope: AdaptationScope,
 }
 

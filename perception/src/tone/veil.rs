@@ -1,4 +1,7 @@
 //! Glare: light that bright places scatter over the whole retina.
+//!
+//! As `pcond` has it after Ward Larson, Rushmeier and Piatko 1997, for what is shown of glare. Not for thresholds,
+//! whose glare is [`crate::glare`], nor for detail within a cell of 1°.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,14 +25,14 @@ const MOST_CELLS: usize = 2500;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Veil {
     cell: CellSize,
-    /// Of each cell, already times the share.
+    /// Veil in the middle of each cell, cd/m², already times the share.
     cells_cd_m2: FrozenPlane,
     mean_cd_m2: f32,
 }
 
-/// Size of a cell: all of a picture have one, which need not be whole pixels. When the last column was what the others left and weighed
-/// as much as they did, a lamp of 5 pixels at the right border of 130 lit what is 20 pixels away 2.5 times as much as one at the
-/// left.
+/// Size of a cell: all of a picture have one, which need not be whole pixels, since a last column of what the others
+/// leave would weigh as much as they do. Measured with such a column, 130 pixels wide: a lamp of 5 pixels at the right
+/// border lights what is 20 pixels away 2.5 times as much as one at the left.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct CellSize {
     width_px: f64,

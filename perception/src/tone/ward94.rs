@@ -1,4 +1,7 @@
-//! Ward's contrast-based scale factor.
+//! Ward's contrast-based scale factor, 1994.
+//!
+//! For what is just visible at one adaptation. Not for scenes of more range than the display's: it is one scale, and
+//! what is too bright is clipped. It knows no rods: colour and acuity are not lost in the dark.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +23,7 @@ use crate::display::Viewing;
 pub struct Ward94 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What the eye is adapted to.
+    /// Whether the eye is adapted to the view as a whole or to each place.
     pub scope: AdaptationScope,
 }
 

@@ -1,4 +1,7 @@
-//! Ward Larson, Rushmeier and Piatko's histogram adjustment, with the human options of Radiance's `pcond`.
+//! Ward Larson, Rushmeier and Piatko's histogram adjustment of 1997, with the human options of Radiance's `pcond`.
+//!
+//! For single pictures of great range. Not for sequences: the histogram is each picture's own, and nothing is adapted
+//! over time.
 
 use serde::{Deserialize, Serialize};
 
@@ -34,9 +37,9 @@ use adjustment::{Adjustment, DisplayRange, Histogram};
 pub struct WardLarson97 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
-    /// What bounds the contrast.
+    /// What bounds the displayed contrast.
     pub ceiling: Ceiling,
-    /// What else the eye loses.
+    /// What is shown of what the eye loses besides brightness.
     pub effects: Effects,
 }
 

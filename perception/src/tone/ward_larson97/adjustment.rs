@@ -19,7 +19,8 @@ pub enum Ceiling {
 }
 
 const BINS: usize = 100;
-/// Of the samples: what is left may be trimmed, or the picture is given up for a linear scale (`pcond`).
+/// Share of the samples that a pass may trim to be the last, and that has to be left lest the picture is given up for a
+/// linear scale (`pcond`).
 const TOLERANCE: f64 = 0.025;
 /// Share of the samples that a last pass may cut: then at most a thousandth of the display's range (in logarithms) is not used.
 const SETTLED: f64 = 1e-3;
@@ -161,7 +162,7 @@ impl Histogram {
         self.cumulative_of(self.counts.iter().sum())
     }
 
-    /// The same as shares of another number of samples.
+    /// Samples below each edge of the bins, as shares of `total`.
     fn cumulative_of(&self, total: f64) -> Vec<f64> {
         let total = total.max(f64::MIN_POSITIVE);
         let mut sum = 0.0;
@@ -198,9 +199,9 @@ impl Ceiling {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Adjustment {
-    /// By the histogram.
+    /// A curve by the histogram.
     Curve(Curve),
-    /// By one number that matches thresholds at the means.
+    /// One factor, which matches thresholds at the means.
     Linear { scale: f64, adaptation_cd_m2: f64 },
 }
 
