@@ -1,7 +1,8 @@
 //! Reads EXR files that anybody may have made or damaged.
 //!
 //! The header is read first and its claims are checked against the file's length and a limit on memory; only then are
-//! pixels read. The `exr` crate alone believes the header and asks for as much memory as it says, which ends the program.
+//! pixels read. The `exr` crate alone believes the header and asks for as much memory as it says, which ends the
+//! program.
 
 use crate::output::{Attribute, CROP, FRAMES_PER_SECOND, PartOf};
 use crate::read_file;
@@ -29,7 +30,8 @@ pub use colour::{ScenePicture, negative_light};
 use wanted::Wanted;
 pub use window::Window;
 
-/// Most memory that the pixels read of a picture may take, those of an EXR file as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
+/// Bytes of memory that the pixels read of a picture may take at most, those of an EXR file as 32-bit floats: 1 GiB, a
+/// 4K frame with 30 channels.
 pub const MEMORY_LIMIT_BYTES: u64 = 1 << 30;
 
 /// Memory that a pixel of the display window takes, as linear RGB.
@@ -51,24 +53,24 @@ pub struct ExrImage {
     pub types: Vec<SampleType>,
     /// Names of channels that were not asked for and are not among `channels`.
     pub unread: Vec<String>,
-    /// Attributes of the part that lays the picture out, and those of others that it lacks, sorted by name. Other types than text and
-    /// numbers are given as text.
+    /// Attributes of the part that lays the picture out, and those of others that it lacks, sorted by name. Other types
+    /// than text and numbers are given as text.
     pub attributes: Vec<(String, Attribute)>,
     /// Parts that were left out because nothing of them lies in the data window.
     pub parts_left_out: Vec<String>,
     /// Lines at the bottom that could not be read: an odd rest of lines in a block of subsampled channels.
     pub lines_left_out: u32,
-    /// What is to be shown; may be smaller or larger than the data. Of a part that this renderer wrote ([`CROP`]) it is the data: the
-    /// file's own display window is that of the whole picture, most of which is not there.
+    /// What is to be shown; may be smaller or larger than the data. Of a part that this renderer wrote ([`CROP`]) it is
+    /// the data: the file's own display window is that of the whole picture, most of which is not there.
     pub display_window: Window,
-    /// Its place in the whole, where this renderer wrote it as a part.
+    /// Place of this picture in the whole, where this renderer wrote it as a part.
     pub part_of: Option<PartOf>,
     /// Whether the file's display window has no pixels or too many for memory, and the data window stands for it.
     pub is_display_window_left_out: bool,
     /// Width of a pixel over its height; 1 where the file's is none that a pixel can have (0.01 to 100).
     pub pixel_aspect_ratio: f64,
-    /// Primaries and white of R, G and B, where the file says them: as chromaticities, by a `colorInteropID`, or as an ACES container. Channels are
-    /// as in the file: see [`ExrImage::scene_picture`].
+    /// Primaries and white of R, G and B, where the file says them: as chromaticities, by a `colorInteropID`, or as an
+    /// ACES container. Channels are as in the file: see [`ExrImage::scene_picture`].
     pub chromaticities: Option<Primaries>,
 }
 
@@ -174,7 +176,8 @@ pub fn read_exr_channels(path: &Path, choose: impl FnOnce(&[String]) -> Vec<Stri
     decode_exr_channels(path, &read_file::bytes(path).map_err(io)?, choose)
 }
 
-/// The layer and the last part of a channel's name, which a dot parts: `beauty.R` is R of beauty, `R` is R of the layer without a name.
+/// The layer and the last part of a channel's name, which a dot parts: `beauty.R` is R of beauty, `R` is R of
+/// the layer without a name.
 pub fn layer_and_part(channel: &str) -> (&str, &str) {
     channel.rsplit_once('.').unwrap_or(("", channel))
 }
@@ -240,8 +243,8 @@ pub fn decode_exr_channels(
     Ok(result)
 }
 
-/// The part whose data window all others are put into: the largest of those with a picture, the first of equals. Renderers crop what they
-/// can, and overscan what is filtered later.
+/// The part whose data window all others are put into: the largest of those with a picture, the first of equals.
+/// Renderers crop what they can, and overscan what is filtered later.
 fn layout(headers: &[Header]) -> &Header {
     let has = |header: &Header, names: &[&str]| {
         let has_one = |name: &&str| {

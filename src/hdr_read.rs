@@ -1,8 +1,8 @@
 //! What the header of a Radiance picture (.hdr) does to its values.
 //!
-//! Tools of Radiance leave the pixels of a picture that they brighten as bright as they made them, and say so in its header:
-//! the light that was there is the value divided by all factors (Radiance's file formats, `EXPOSURE=` and `COLORCORR=`). `PRIMARIES=`
-//! says of which colours that light is.
+//! Tools of Radiance leave the pixels of a picture that they brighten as bright as they made them, and say so in its
+//! header: the light that was there is the value divided by all factors (Radiance's file formats, `EXPOSURE=` and
+//! `COLORCORR=`). `PRIMARIES=` says of which colours that light is.
 
 use fechner_perception::primaries::{Matrix, Primaries, apply};
 use image::codecs::hdr::{HdrDecoder, HdrMetadata};
@@ -13,8 +13,8 @@ use std::borrow::Cow;
 pub struct HdrHeader {
     /// What red, green and blue are to be multiplied by.
     to_light: [f32; 3],
-    /// To Rec.709, where the primaries are others. Their white becomes its white: that of Radiance's own is of equal energy, and means no
-    /// colour.
+    /// To Rec.709, where the primaries are others. Their white becomes its white: that of Radiance's own is of equal
+    /// energy, and means no colour.
     to_rec709: Option<Matrix>,
     /// Width of a pixel over its height; 1 where the file's is none that a pixel can have (0.01 to 100).
     pub pixel_aspect_ratio: f64,
@@ -63,8 +63,8 @@ fn is_divisor(factor: f32) -> bool {
     factor.is_finite() && factor > 0.0
 }
 
-/// The lines of a header that say what cannot be and are not looked at; none of what is no Radiance picture. `bytes` are those of
-/// [`with_known_header`].
+/// The lines of a header that say what cannot be and are not looked at; none of what is no Radiance picture. `bytes`
+/// are those of [`with_known_header`].
 pub fn notes(bytes: &[u8]) -> Vec<String> {
     let Ok(decoder) = HdrDecoder::new(bytes) else { return Vec::new() };
     let metadata = decoder.metadata();
@@ -103,10 +103,10 @@ pub fn is_xyze(bytes: &[u8]) -> bool {
     header_bytes(bytes).is_some_and(|end| bytes[..end].split(|&byte| byte == b'\n').any(is_format_of_xyz))
 }
 
-/// The file as decoders know it: with the signature that they look for, where some programs write `#?RGBE`, with CIE XYZ as colours of
-/// such primaries, and without the header's indented lines. Those are the headers of the pictures that it was made from, as `pcomb` and
-/// `pcompos` keep them; what they say was done to other pixels. Radiance takes variables at a line's start alone, the decoder's trims what
-/// stands before them.
+/// The file as decoders know it: with the signature that they look for, where some programs write `#?RGBE`, with CIE
+/// XYZ as colours of such primaries, and without the header's indented lines. Those are the headers of the pictures
+/// that it was made from, as `pcomb` and `pcompos` keep them; what they say was done to other pixels. Radiance takes
+/// variables at a line's start alone, the decoder's trims what stands before them.
 pub fn with_known_header(bytes: &[u8]) -> Cow<'_, [u8]> {
     let Some(header_bytes) = header_bytes(bytes) else { return Cow::Borrowed(bytes) };
     let (header, pixels) = bytes.split_at(header_bytes);
@@ -140,7 +140,8 @@ fn header_bytes(bytes: &[u8]) -> Option<usize> {
 mod tests {
     use super::*;
 
-    /// A picture that `pcomb` made of one that had been brightened: its own pixels are as bright as they are.
+    /// A picture that `pcomb` made of one that had been brightened: its own pixels are as bright as they are, whatever
+    /// lines of what it was made from say.
     #[test]
     fn lines_of_what_it_was_made_from_say_nothing_of_it() {
         let picture = |header: &str| [header.as_bytes(), b"\n\n-Y 1 +X 1\n\x80\x80\n\n"].concat();

@@ -1,4 +1,5 @@
-//! Whether a JPEG file is whole: decoders fill with grey what is cut off, and say nothing. And what it says and is not heeded.
+//! Whether a JPEG file is whole: decoders fill with grey what is cut off, and say nothing. And what it says and is not
+//! heeded.
 
 use crate::output::{PROFILE_NOT_READ, names_srgb};
 use image::codecs::jpeg::JpegDecoder;
@@ -15,7 +16,8 @@ pub fn has_end(bytes: &[u8]) -> bool {
     end_of_last_scan(bytes).is_some()
 }
 
-/// Where the marker of the end stands behind the last scan. Within a scan's codes it cannot stand (ITU-T T.81, B.1.1.5).
+/// Where the marker of the end stands behind the last scan. Within a scan's codes it cannot stand (ITU-T T.81,
+/// B.1.1.5).
 fn end_of_last_scan(bytes: &[u8]) -> Option<usize> {
     const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
     const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
@@ -26,8 +28,9 @@ fn end_of_last_scan(bytes: &[u8]) -> Option<usize> {
 /// What to say of a file that has its end and lacks some of what is before it.
 pub const INCOMPLETE: &str = "the picture is not whole: its data end before its last pixel";
 
-/// Whether a file's data reach the last pixel of the picture that was decoded from them. Decoders make up what is missing and do not say so;
-/// but what they make of a whole file is the same with more data before its end, and of another one it is not.
+/// Whether a file's data reach the last pixel of the picture that was decoded from them. Decoders make up what is
+/// missing and do not say so; but what they make of a whole file is the same with more data before its end, and
+/// of another one it is not.
 pub fn is_complete(bytes: &[u8], decoded: &DynamicImage) -> bool {
     /// Codes of many lengths, and no byte that begins a marker.
     const MORE: [u8; 64] = {
@@ -90,7 +93,8 @@ mod tests {
         assert!(notes(b"words").is_empty());
     }
 
-    /// A picture of 128×128 pixels whose data were cut, with the end's marker behind them, was taken for whole: 90 % of it was made up.
+    /// Regression: a picture of 128×128 pixels whose data were cut, with the end's marker behind them, was taken for
+    /// whole: 90 % of it was made up.
     #[test]
     fn data_that_end_early_are_told() {
         let photo = image::RgbImage::from_fn(128, 128, |x, y| {

@@ -1,7 +1,7 @@
 //! Locks between processes: the system's own, which end with their process however it ends.
 //!
-//! They spare double work and keep two processes from writing one film. Every file is written at once and a unit rendered twice gives
-//! the same bytes: where a file system has no locks, everybody gets them.
+//! They spare double work and keep two processes from writing one film. Every file is written at once and a unit
+//! rendered twice gives the same bytes: where a file system has no locks, everybody gets them.
 
 use std::fs::{File, TryLockError};
 use std::io::{self, Write};
@@ -25,8 +25,8 @@ impl Lock {
         (&self.file).write_all(holder.as_bytes())
     }
 
-    /// Whether the file that is locked is the one that has this name now: a holder before may have removed it meanwhile, and then
-    /// nobody else will find this lock.
+    /// Whether the file that is locked is the one that has this name now: a holder before may have removed it
+    /// meanwhile, and then nobody else will find this lock.
     #[cfg(unix)]
     pub fn is_at(&self, path: &Path) -> bool {
         use std::os::unix::fs::MetadataExt;
@@ -35,7 +35,7 @@ impl Lock {
         named.is_some() && named == self.file.metadata().map(identity).ok()
     }
 
-    /// The same elsewhere, where a file that is open keeps its name.
+    /// Whether the file that is locked has this name now: always, where a file that is open keeps its name.
     #[cfg(not(unix))]
     pub fn is_at(&self, _: &Path) -> bool {
         true

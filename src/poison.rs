@@ -1,11 +1,13 @@
-//! Values behind mutexes, whatever became of the threads that changed them.
+//! Opens values behind mutexes, whatever became of the threads that changed them. Not where a half-made change could be
+//! seen.
 
 use std::sync::LockResult;
 
 /// What a mutex or a condition gives, whether or not a thread panicked while it held the lock.
 pub trait Unpoisoned<T> {
-    /// The value as it was left. What is locked here is changed in single steps, so that it is whole wherever a thread may panic, and that
-    /// thread has said what went wrong: a second panic would only keep others from saving what they have.
+    /// The value as it was left. What is locked here is changed in single steps, so that it is whole wherever
+    /// a thread may panic, and that thread has said what went wrong: a second panic would only keep others
+    /// from saving what they have.
     fn unpoisoned(self) -> T;
 }
 

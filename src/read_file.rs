@@ -1,4 +1,5 @@
-//! Files that are read whole, of whatever path a user names: nothing that has no end, and nothing that waits for a writer.
+//! Files that are read whole, of whatever path a user names: nothing that has no end, and nothing that waits for a
+//! writer.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Read as _};
@@ -13,7 +14,7 @@ pub fn open(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// Its bytes.
+/// Reads a file's bytes.
 ///
 /// # Errors
 /// As [`open`].
@@ -23,7 +24,7 @@ pub fn bytes(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Its text, which is UTF-8.
+/// Reads a file's text, which is UTF-8.
 ///
 /// # Errors
 /// As [`open`], and where it is no such text.

@@ -1,7 +1,8 @@
 //! Words of the program to whoever started it, which cost nothing where nobody listens any more.
 //!
-//! `eprintln!` and `println!` panic where the other end is closed: a terminal that hangs up, or `2>&1 | head -1`, would end a
-//! render of hours without its picture. [`say!`](crate::say!) and [`answer!`](crate::answer!) take their place everywhere.
+//! `eprintln!` and `println!` panic where the other end is closed: a terminal that hangs up, or
+//! `2>&1 | head -1`, would end a render of hours without its picture. [`say!`](crate::say!) and
+//! [`answer!`](crate::answer!) take their place everywhere.
 
 use std::fmt::Arguments;
 use std::io::{self, Write, stderr, stdout};
@@ -38,7 +39,7 @@ pub fn answer_line(words: Arguments) {
     answered(writeln!(stdout(), "{words}"));
 }
 
-/// To be called at the end of the program.
+/// Writes out what is left of the answers. To be called at the end of the program.
 ///
 /// # Errors
 /// If answers did not reach a standard output that still wanted them, as a file on a full disk.
@@ -47,7 +48,8 @@ pub fn finish() -> Result<(), &'static io::Error> {
     FAILURE.get().map_or(Ok(()), Err)
 }
 
-/// Notes whether an answer that was written in another way has arrived. A reader that has read enough, as `head`, is content.
+/// Notes whether an answer that was written in another way has arrived. A reader that has read enough, as `head`, is
+/// content.
 pub fn answered(written: io::Result<()>) {
     if let Err(error) = written
         && error.kind() != io::ErrorKind::BrokenPipe

@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 /// A kind of file.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Kind {
-    /// Its first bytes: as in PNG, a byte that no text has and line ends that careless transfers change.
+    /// First bytes of a file of this kind: as in PNG, a byte that no text has and line ends that careless transfers
+    /// change.
     pub magic: [u8; 12],
     /// Raised whenever the bytes after it mean something else.
     pub version: u32,
@@ -46,7 +47,7 @@ pub enum SealedError {
         /// What it should be.
         kind: &'static Kind,
     },
-    /// That of an earlier or later program.
+    /// The file is of an earlier or later program's version.
     #[error(
         "cannot read {}: its format is version {found}, and this program reads version {}", .path.display(), .kind.version
     )]
@@ -108,7 +109,7 @@ impl Kind {
         bytes.starts_with(&self.magic)
     }
 
-    /// All bytes of a file. One of another kind is refused by its first bytes, however long it is.
+    /// Reads all bytes of a file. One of another kind is refused by its first bytes, however long it is.
     ///
     /// # Errors
     /// [`SealedError`] for what is not of this kind and version; what follows is not looked at.

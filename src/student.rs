@@ -1,10 +1,11 @@
-//! Student's t, of any number of degrees of freedom.
+//! Student's t, of any number of degrees of freedom: half widths of intervals.
 
-/// More degrees of freedom than this are taken for this many: the quantile of 95 % is 1.962 there and 1.960 at infinity.
+/// More degrees of freedom than this are taken for this many: the quantile of 95 % is 1.962 there and 1.960 at
+/// infinity.
 const MOST_DEGREES: f64 = 1000.0;
 
-/// The half width, in standard errors, of a two-sided interval of this level (0 to 1, without them): 12.7 for 95 % and one degree of
-/// freedom, 1.96 for many. Degrees of freedom may be fractions, of one at least.
+/// The half width, in standard errors, of a two-sided interval of this level (0 to 1, without them): 12.7 for 95 % and
+/// one degree of freedom, 1.96 for many. Degrees of freedom may be fractions, of one at least.
 pub(crate) fn t_half_width(level: f64, degrees_of_freedom: f64) -> f64 {
     // What is not a number goes by the widest, too.
     let degrees = if degrees_of_freedom >= 1.0 { degrees_of_freedom.min(MOST_DEGREES) } else { 1.0 };
@@ -26,8 +27,8 @@ pub(crate) fn t_half_width(level: f64, degrees_of_freedom: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Probability of |T| > t: the regularised incomplete beta function I(ν/2, ½) at ν / (ν + t²), by its series of positive terms
-/// (Abramowitz and Stegun 1964, 26.5.4).
+/// Probability of |T| > t: the regularised incomplete beta function I(ν/2, ½) at ν / (ν + t²), by its series of
+/// positive terms (Abramowitz and Stegun 1964, 26.5.4).
 fn share_outside(t: f64, degrees: f64) -> f64 {
     let x = degrees / (degrees + t * t);
     if x >= 1.0 {

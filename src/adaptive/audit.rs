@@ -1,9 +1,9 @@
 //! Whether the stopped picture is as noisy as the loop thinks.
 //!
-//! On a stratified 2 % of tiles, six at least, as many fresh samples as the tile has are taken and thrown away. What can be seen of the
-//! difference between fresh and kept, over what the variance predicts, is the audit's ratio: 1 if the variance is right,
-//! above 1 where light was found that the stopping samples had missed. Denoised pictures have an audit of their own
-//! ([`audit_unproven`]).
+//! On a stratified 2 % of tiles, six at least, as many fresh samples as the tile has are taken and thrown away. What
+//! can be seen of the difference between fresh and kept, over what the variance predicts, is the audit's ratio: 1 if
+//! the variance is right, above 1 where light was found that the stopping samples had missed. Denoised pictures have an
+//! audit of their own ([`audit_unproven`]).
 
 mod unproven;
 
@@ -20,12 +20,12 @@ use crate::student::t_half_width;
 use fechner_perception::{Plane, seen};
 use serde::{Deserialize, Serialize};
 
-/// Side of a tile, pixels. The noise of independent pixels, most of whose visible energy lies above 2 cycles a degree, is
-/// judged as well in small tiles, and there are more of them.
+/// Side of a tile, pixels. The noise of independent pixels, most of whose visible energy lies above 2 cycles a degree,
+/// is judged as well in small tiles, and there are more of them.
 const TILE: usize = 16;
 /// Tiles of which one is audited.
 const STRATUM: usize = 50;
-/// Fewer tiles' scatter says nothing of how sure the ratio is: two gave −2.53 ± 0.24 on `cornell-glass`.
+/// Fewer tiles' scatter says nothing of how sure the ratio is: two give −2.53 ± 0.24 on `cornell-glass`.
 const LEAST_TILES: usize = 6;
 /// Keeps audits' random numbers apart from the picture's.
 const AUDIT_STREAM: u64 = 0x0041_5544_4954;
@@ -42,19 +42,21 @@ pub struct Audit {
     pub samples: u64,
     /// Visible energy of fresh less kept, over what was predicted; 1 where nothing was.
     pub ratio: f64,
-    /// Standard error of the ratio, from the scatter between tiles; infinite of a single tile, and where nothing was predicted.
+    /// Standard error of the ratio, from the scatter between tiles; infinite of a single tile, and where nothing was
+    /// predicted.
     pub standard_error: f64,
 }
 
 impl Audit {
-    /// Whether nothing was predicted to show in its tiles, so that there is nothing to compare fresh samples with. Of one tile that is not
-    /// known.
+    /// Whether nothing was predicted to show in its tiles, so that there is nothing to compare fresh samples with. Of
+    /// one tile that is not known.
     pub fn had_nothing_to_find(&self) -> bool {
         self.tiles > 1 && self.standard_error.is_infinite()
     }
 
-    /// Whether the variance is too low, at one-sided 95 %, by more than a tenth. By Student's t, since a few tiles' scatter is surer to be
-    /// too small than a normal's is: 2.015 standard errors for six tiles, 1.645 for many. One tile has no scatter.
+    /// Whether the variance is too low, at one-sided 95 %, by more than a tenth. By Student's t, since a few
+    /// tiles' scatter is surer to be too small than a normal's is: 2.015 standard errors for six tiles, 1.645 for
+    /// many. One tile has no scatter.
     pub fn disagrees(&self) -> bool {
         /// Outside of a two-sided interval, half of what is left out lies on each side.
         const TWO_SIDED_LEVEL: f64 = 0.9;
@@ -155,7 +157,7 @@ fn choose_tiles(tiles: &[Tile], strata: usize, round: u32) -> Vec<Tile> {
 
 /// Samples of some pixels that are in no picture.
 struct FreshSamples {
-    /// Of each pixel.
+    /// Sums of both halves, of each pixel.
     halves: Vec<[HalfPixel; 2]>,
     /// How many in all.
     samples: u64,
@@ -195,7 +197,7 @@ impl FreshSamples {
     }
 }
 
-/// The same samples again, `times` as many.
+/// A plan of as many samples as these pixels have, `times` over.
 fn repetition(film: &Film, pixels: &[usize], times: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
     for &pixel in pixels {

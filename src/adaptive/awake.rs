@@ -1,16 +1,17 @@
 //! Threads that do not fall asleep between the small pieces of a look.
 //!
-//! A look at a small picture is a hundred steps of a tenth of a millisecond, each cut in two or more. An idle thread of the pool sleeps
-//! after a few microseconds and takes as long to wake as its half of a step takes: the look at 128×128 that ends a render takes 4.85 % of
-//! the time of tracing with two threads, and 5.18 without this (`benches/results/equal-time.md`). Not for work in large pieces.
+//! A look at a small picture is a hundred steps of a tenth of a millisecond, each cut in two or more. An idle thread of
+//! the pool sleeps after a few microseconds and takes as long to wake as its half of a step takes: the look at 128×128
+//! that ends a render takes 4.85 % of the time of tracing with two threads, and 5.18 without this
+//! (`benches/results/equal-time.md`). Not for work in large pieces.
 
 use rayon::Yield;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Without work for so long, a thread may sleep: where a look is serial for a while, or waits for a denoiser. It is not what keeps steps
-/// within steps from waiting for ever: thieves take the oldest job first, so that whoever is within a step finds nobody left to stand by
-/// (the test ends with an hour in its place, too).
+/// Without work for so long, a thread may sleep: where a look is serial for a while, or waits for a denoiser. It is not
+/// what keeps steps within steps from waiting for ever: thieves take the oldest job first, so that whoever is within a
+/// step finds nobody left to stand by (the test ends with an hour in its place, too).
 const PATIENCE: Duration = Duration::from_micros(500);
 
 /// Runs `work` while the other threads of the pool stand by.

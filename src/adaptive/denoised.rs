@@ -23,17 +23,17 @@ use std::time::Instant;
 pub struct DenoisedPicture {
     /// Linear RGB in cd/m²: denoised, and moved towards the raw mean where that is proven better.
     pub rgb_cd_m2: Vec<[f32; 3]>,
-    /// Its luminance.
+    /// Luminance of the denoised picture, cd/m².
     pub luminance_cd_m2: Plane,
     /// Half the difference of the denoised halves' luminance as displayed, cd/m².
     pub half_difference: Plane,
     /// What can be seen of its error, without importance.
     pub error: DenoisedError,
-    /// The same of luminance if all of it were new in every frame, in a shot.
+    /// What can be seen of the error of luminance in a shot, if all of it were new in every frame, without importance.
     pub error_as_noise: Option<DenoisedError>,
 }
 
-/// By which the error of a denoised picture is judged.
+/// The thresholds by which the error of a denoised picture is judged.
 #[derive(Clone, Copy)]
 pub(super) struct DenoisedThresholds<'a> {
     /// What is left of the noise.
@@ -169,8 +169,8 @@ impl TimedDenoising {
     }
 }
 
-/// The denoised picture, moved towards the raw one where that is proven better, as far as the display shows a difference:
-/// `slope` is that of the displayed over the scene's light around the denoised picture.
+/// The denoised picture, moved towards the raw one where that is proven better, as far as the display shows a
+/// difference: `slope` is that of the displayed over the scene's light around the denoised picture.
 fn blended_rgb(
     thresholds: &ThresholdMap,
     error: &DenoisedError,
@@ -201,8 +201,8 @@ fn blended_rgb(
     picture
 }
 
-/// The least and the most that a raw channel has at a pixel and the eight around it: bands that are moved by different shares
-/// may overshoot, and no further than to what paths have found.
+/// The least and the most that a raw channel has at a pixel and the eight around it: bands that are moved by different
+/// shares may overshoot, and no further than to what paths have found.
 fn raw_range(raw: &Plane, x: usize, y: usize) -> (f32, f32) {
     let (columns, rows) = (x.saturating_sub(1)..raw.width().min(x + 2), y.saturating_sub(1)..raw.height().min(y + 2));
     let around = rows.flat_map(|y| columns.clone().map(move |x| raw.get(x, y)));
@@ -229,7 +229,8 @@ mod tests {
         (30..34).contains(&x)
     }
 
-    /// A denoiser lost half of the lamp, and no band but the finest is worth moving back: what it lost stays the lamp's.
+    /// A denoiser has lost half of the lamp, and no band but the finest is worth moving back: what it lost stays the
+    /// lamp's.
     #[test]
     fn a_lamp_does_not_ring_when_its_picture_moves_towards_the_raw_mean() {
         let viewing = Viewing::of(Display::preset("strict").unwrap());

@@ -1,4 +1,5 @@
-//! What one more sample of a pixel does for the picture as a whole, where not everything that is wanted can be had at once.
+//! What one more sample of a pixel does for the picture as a whole, where not everything that is wanted can be had at
+//! once.
 //!
 //! Not for how many samples a visibility takes: these are `plan`'s.
 
@@ -10,21 +11,23 @@ use crate::integrator::{BlockWork, SamplePlan};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 
-/// What comes before the next plan is this share of what is there: counts adapt while variances become known. More, as far as the
-/// visibility is from the rung, was no gain (`benches/results/denoising.md`).
+/// What comes before the next plan is this share of what is there: counts adapt while variances become known. More, as
+/// far as the visibility is from the rung, was no gain (`benches/results/denoising.md`).
 pub(super) const GROWTH: f64 = 0.5;
 /// Even counts are kept where the best ones would take more than this share of their samples.
 pub(super) const EVEN_ENOUGH: f64 = 0.95;
-/// The same of raw pictures on the way to a far rung: between the Cornell box (0.95 to 0.96), whose squared error was 0.90 ± 0.03 of
-/// even counts' when this was chosen and is 1.04 ± 0.02 by present masks, and the product shot (0.98), where even counts have 9.875 JOD
-/// at 96 samples and uneven ones 9.834 (`benches/results/equal-time.md`).
+/// Even counts are kept, in raw pictures on the way to a far rung, where the best ones would take more than this share
+/// of their samples. It lies between the Cornell box (0.95 to 0.96), whose squared error was 0.90 ± 0.03 of even
+/// counts' when this was chosen and is 1.04 ± 0.02 by present masks, and the product shot (0.98), where even counts
+/// have 9.875 JOD at 96 samples and uneven ones 9.834 (`benches/results/equal-time.md`).
 const EVEN_ENOUGH_WHILE_FAR: f64 = 0.97;
 /// Samples for every pixel up to which a plan is never cut: less would hardly pay for the look before it.
 const LEAST_UNCUT: f64 = 16.0;
-/// No pixel's noise counts as more than so many times the picture's mean: variances of few samples are not worth more trust.
+/// No pixel's noise counts as more than so many times the picture's mean: variances of few samples are not worth more
+/// trust.
 const MOST_TIMES_MEAN: f64 = 16.0;
 
-/// As much of a plan as there should be before the next look, where it does most for the picture.
+/// The part of a plan that is worth its samples before the next look: where it does most for the picture.
 pub(super) fn most_worthwhile(plan: SamplePlan, film: &Film, judgement: &Judgement) -> SamplePlan {
     cut(plan, film, judgement, most_at_once(film))
 }
@@ -35,8 +38,8 @@ fn most_at_once(film: &Film) -> u64 {
     (GROWTH * film.total_samples() as f64).max(LEAST_UNCUT * pixels) as u64
 }
 
-/// Samples for a rung that is far nearly everywhere: where they do most for the picture among what shows by itself. `None` where even
-/// counts would do as much.
+/// Samples for a rung that is far nearly everywhere: where they do most for the picture among what shows by itself.
+/// `None` where even counts would do as much.
 ///
 /// What the cheapest counts are does not matter yet, and to find them was a quarter of a small look.
 pub(super) fn while_far(film: &Film, judgement: &Judgement, rung: f64, max_samples: u32) -> Option<SamplePlan> {
@@ -62,9 +65,10 @@ pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u6
 /// Squared visibility of one sample's noise in each pixel for itself.
 pub(super) struct Energies {
     whole: Plane,
-    /// As each half may go by it, where that is not the same. By what both may have missed a pixel that met a star's rim by luck was less
-    /// urgent than its neighbour that did not: stars were 6.4 ± 0.7 % too bright at 64 samples a pixel (`benches/results/energy.md`, lamps
-    /// on black).
+    /// Energies by which each half goes, where they differ from the whole's: what both halves may have missed must
+    /// not count, or a pixel that met a star's rim by luck is less urgent than its neighbour that did not. Measured
+    /// by what both may have missed: stars 6.4 ± 0.7 % too bright at 64 samples a pixel
+    /// (`benches/results/energy.md`, lamps on black).
     of_halves: Option<[Plane; 2]>,
 }
 
@@ -80,19 +84,20 @@ impl Energies {
         }
     }
 
-    /// As the whole picture is judged.
+    /// Energy of each pixel by which the whole picture is judged.
     pub(super) fn of_both(&self) -> &[f32] {
         self.whole.values()
     }
 
-    /// As a half may go by it.
+    /// Energy of each pixel by which a half may go.
     pub(super) fn of_half(&self, half: Half) -> &[f32] {
         self.of_halves.as_ref().map_or(&self.whole, |halves| &halves[half.index()]).values()
     }
 }
 
-/// Energies of which pixels with known lamps that few samples have met all have the mean of these. A pixel that was lucky is bright, so that
-/// its threshold is high: lamps far out of focus were 7.3 ± 1.0 % too bright with 32 samples a pixel.
+/// Energies in which all pixels with known lamps that few samples have met have the mean of these pixels. A pixel
+/// that was lucky is bright, so that its threshold is high. Measured without: lamps far out of focus 7.3 ± 1.0 % too
+/// bright with 32 samples a pixel.
 fn with_unmet_alike(film: &Film, mut energies: Plane) -> Plane {
     let unmet: Vec<usize> = (0..film.pixel_count()).filter(|&pixel| few_meetings(film, pixel).is_some()).collect();
     let of_unmet =
@@ -102,13 +107,14 @@ fn with_unmet_alike(film: &Film, mut energies: Plane) -> Plane {
     energies
 }
 
-/// What one more sample takes away of a half's share of its pixel's visible energy, e/n: by its own count n, not the pixel's. The other half's
-/// count was decided by this one's samples, and by both a half that was lucky stayed as it was, while the other one grew: the sun
-/// through blinds made a room 0.8 % too bright (`benches/results/energy.md`).
+/// What one more sample takes away of a half's share of its pixel's visible energy, e/n: by its own count n, not the
+/// pixel's. The other half's count was decided by this one's samples: by both counts, a half that was lucky stays as it
+/// is while the other one grows. Measured by both: the sun through blinds makes a room 0.8 % too bright
+/// (`benches/results/energy.md`).
 ///
-/// Samples that go where it is most make counts that go as √e and leave the least mean energy (Neyman 1934) of known variances.
-/// Counts for equal visibility go as e: at 96 samples a pixel of the Cornell box their FLIP was 1.09 times that of even counts, with
-/// these it is 1.015 (`benches/results/equal-time.md`).
+/// Samples that go where it is most make counts that go as √e and leave the least mean energy (Neyman 1934) of known
+/// variances. Counts for equal visibility go as e: at 96 samples a pixel of the Cornell box their FLIP is 1.09 times
+/// that of even counts, with these it is 1.015 (`benches/results/equal-time.md`).
 fn gains(film: &Film, energies: &Energies) -> impl Fn(&BlockWork) -> f32 {
     let defended = Half::BOTH.map(|half| defended(energies.of_half(half)));
     move |block| {
@@ -127,8 +133,8 @@ pub(super) fn gain(energy: f64, samples: f64) -> f64 {
     energy / (samples * samples)
 }
 
-/// Samples that the best counts would need for the energy that even counts leave, as a share of theirs: the sum of e/n is smallest
-/// where n goes as √e, so (mean √e)² / mean e (Cauchy and Schwarz: at most 1).
+/// Samples that the best counts would need for the energy that even counts leave, as a share of theirs: the sum of e/n
+/// is smallest where n goes as √e, so (mean √e)² / mean e (Cauchy and Schwarz: at most 1).
 pub(super) fn share_of_even(energies: &[f64]) -> f64 {
     let root: f64 = energies.iter().map(|energy| energy.sqrt()).sum();
     let sum: f64 = energies.iter().sum();
@@ -137,8 +143,9 @@ pub(super) fn share_of_even(energies: &[f64]) -> f64 {
 
 /// Energies of one sample with their mean added, and none much above it.
 ///
-/// Without the mean, noisy pixels starve the rest: a dark room denoised by Open Image Denoise had JOD 9.52 at 256 samples a pixel
-/// where even counts have 9.74; with it 0.02 to 0.07 more than even counts from 8 to 256 (`benches/results/denoising.md`).
+/// Without the mean, noisy pixels starve the rest. Measured in a dark room denoised by Open Image Denoise: without it
+/// JOD 9.52 at 256 samples a pixel where even counts have 9.74; with it 0.02 to 0.07 more than even counts from 8 to
+/// 256 (`benches/results/denoising.md`).
 pub(super) fn defended(energies: &[f32]) -> Vec<f64> {
     let energies = || energies.iter().map(|&energy| f64::from(energy));
     let mean = energies().filter(|energy| energy.is_finite()).sum::<f64>() / energies().len().max(1) as f64;
@@ -170,7 +177,8 @@ mod tests {
         assert!(left * 20 > cut.blocks.len() * 19, "{left} of {}", cut.blocks.len());
     }
 
-    /// On the way to what is far, next to nothing goes where noise does not show by itself; where it is even, so are counts.
+    /// On the way to what is far, next to nothing goes where noise does not show by itself; where it is even, so are
+    /// counts.
     #[test]
     fn what_shows_is_sampled_while_the_rung_is_far() {
         let judged = |film: &Film| judge(film, &settings(), 1.0).expect("judges");

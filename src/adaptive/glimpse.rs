@@ -1,7 +1,7 @@
 //! A small, denoised picture of all that a camera sees: how light the view is, before any of it is rendered.
 //!
-//! For tone operators that must be fitted to more than the picture at hand: to a shot of which it is a frame, to the whole of
-//! which it is a part. Not for output, nor for thresholds.
+//! For tone operators that must be fitted to more than the picture at hand: to a shot of which it is a frame, to the
+//! whole of which it is a part. Not for output, nor for thresholds.
 
 use super::judge::guide_rgb;
 use super::plan::{pilot_plan, uniform_plan};
@@ -12,15 +12,16 @@ use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{SceneLight, ToneOperator};
 use std::sync::Arc;
 
-/// Longest side of a glimpse in pixels: at 64 the lamps of `scenes/many-lights.toml` touched more than one pixel in twenty, which is where the
-/// operator `constant` has its white, and that was at 911 cd/m² for a picture of 512×384 that has it at 137; here it is at 145.
+/// Longest side of a glimpse in pixels. In smaller ones lamps touch too large a share of the pixels: at 64 those of
+/// `scenes/many-lights.toml` touch more than one in twenty, which is where the operator `constant` has its white.
+/// Measured for a picture of 512×384 whose white is at 137 cd/m²: 911 at 64, 145 here.
 const LONGEST_SIDE: u32 = 256;
 /// Samples of a glimpse, about.
 const SAMPLES: u32 = 1 << 17;
 /// Most samples of one that goes on until it is steady: 2.5 s of a box on two cores.
 const MOST_SAMPLES: u64 = 1 << 20;
-/// Longest side in pixels of a coarse glimpse, and its most samples: with 512 a pixel of a picture of 64×36 eyes in `scenes/theatre-door.toml`
-/// adapt as with 512 a pixel of one of 128×72, to 3 %.
+/// Longest side in pixels of a coarse glimpse, and its most samples: with 512 a pixel of a picture of 64×36 eyes in
+/// `scenes/theatre-door.toml` adapt as with 512 a pixel of one of 128×72, to 3 %.
 const COARSE_SIDE: u32 = 64;
 const MOST_COARSE_SAMPLES: u64 = 1 << 21;
 /// A brief glimpse's side is at most this share of the picture's: it takes a sample for each of the picture's pixels.
@@ -28,15 +29,15 @@ const SIDES_OF_A_BRIEF_GLIMPSE: u32 = 4;
 /// Change of light by a doubling of the samples below which it is.
 const STEADY: f32 = 0.01;
 
-/// Looks at all of the picture, whatever part of it the settings ask for, with as many samples as it takes until twice as many change little:
-/// noise spreads light, and with 8 samples `scenes/many-lights.toml` at 128×96 has its white at 140 cd/m², with 32 and 128 at 409 and 391. A pure
-/// function of scene and settings.
+/// Looks at all of the picture, whatever part of it the settings ask for, with as many samples as it takes until twice
+/// as many change little: noise spreads light, and with 8 samples `scenes/many-lights.toml` at 128×96 has its white at
+/// 140 cd/m², with 32 and 128 at 409 and 391. A pure function of scene and settings.
 pub fn steady_glimpse(scene: Arc<Scene>, trace: &TraceSettings, nits_per_unit: f64) -> SceneLight {
     steady_light(&PathTracer::new(scene, small(trace)), nits_per_unit)
 }
 
-/// A steady glimpse of what one operator asks for, until what it makes of it is steady as well, and by what share that changed when the
-/// samples were doubled last.
+/// A steady glimpse of what one operator asks for, until what it makes of it is steady as well, and by what share that
+/// changed when the samples were doubled last.
 pub fn steady_glimpse_for(
     operator: &dyn ToneOperator,
     scene: Arc<Scene>,
@@ -48,8 +49,9 @@ pub fn steady_glimpse_for(
     steady_light_for(operator, &tracer, nits_per_unit, MOST_SAMPLES, made_of_it)
 }
 
-/// The same with fewer pixels and up to thirty times as many samples in each, for views that are lit by what few samples find: most pixels of
-/// a glimpse have none of it then, and their geometric mean is that of another scene.
+/// A steady glimpse as [`steady_glimpse_for`] takes it, with fewer pixels and up to thirty times as many samples in
+/// each, for views that are lit by what few samples find: most pixels of a glimpse have none of it then, and their
+/// geometric mean is that of another scene.
 pub fn coarse_glimpse_for(
     operator: &dyn ToneOperator,
     scene: Arc<Scene>,
@@ -73,7 +75,8 @@ pub fn brief_glimpse_for(
     Seen::of(&pilot(&tracer), &tracer, nits_per_unit).light_for(operator, tracer.settings().width)
 }
 
-/// A steady glimpse from where a camera is now, by a tracer that is there and works by the same settings again in the end.
+/// A steady glimpse from where a camera is now, by a tracer that is there and works by the same settings again in the
+/// end.
 pub fn steady_glimpse_from(
     camera: &Camera,
     tracer: &mut PathTracer,
@@ -142,8 +145,8 @@ impl Seen {
     fn of(film: &Film, tracer: &PathTracer, nits_per_unit: f64) -> Self {
         let estimate = film.estimate(nits_per_unit);
         if tracer.settings().transparent {
-            // Denoised, light leaks over silhouettes: whites of `ward94` came out at 10304 cd/m² for 12333 of a chess pawn at 64×64, by the means at
-            // 12197.
+            // Denoised, light leaks over silhouettes: of a chess pawn at 64×64, whose white by `ward94` is at 12333
+            // cd/m², it comes out at 10304, by the means at 12197.
             return Self { rgb_cd_m2: estimate.rgb_cd_m2, alpha: Some(film.coverage()) };
         }
         Self { rgb_cd_m2: guide_rgb(film, &estimate), alpha: None }
@@ -223,8 +226,8 @@ mod tests {
     use fechner_perception::tone::{ToneSettings, operator_with};
     use std::path::Path;
 
-    /// Where few samples spread lamps over the picture, a glimpse goes on until it has the light of a render. With a pilot's samples white
-    /// was at a third.
+    /// Where few samples spread lamps over the picture, a glimpse goes on until it has the light of a render.
+    /// Regression: with a pilot's samples white was at a third of the render's.
     #[test]
     fn a_steady_glimpse_has_the_light_of_the_whole() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/many-lights.toml");
@@ -241,7 +244,8 @@ mod tests {
         let (right, few) = (of_film(&film), of_film(&pilot(&tracer)));
         let steady = Steady::of(&tracer, scene.nits_per_unit, MOST_SAMPLES, &|_| Vec::new());
         let steady = levels(&steady.seen.rgb_cd_m2)[1];
-        // Of six seeds with the 64 samples that it ends with white scatters by 2.6 %: three deviations from one with 128.
+        // Of six seeds with the 64 samples that it ends with white scatters by 2.6 %: three deviations from one
+        // with 128.
         assert!((steady / right - 1.0).abs() < 0.1, "{steady} cd/m² at a twentieth, in the whole {right}");
         assert!(few < 0.5 * right, "{few} cd/m² by a pilot: the scene shows nothing");
     }

@@ -1,5 +1,5 @@
-//! Whose noise it is that still shows where each pixel by itself has what it needs: of a pixel one half may have stayed behind, and surroundings
-//! add up.
+//! Whose noise it is that still shows where each pixel by itself has what it needs: of a pixel one half may have stayed
+//! behind, and surroundings add up.
 //!
 //! Not for where a picture is far from its target: what shows there is nearly everybody's.
 
@@ -20,11 +20,12 @@ const HELPS: f32 = 0.01;
 /// No energy counts as more: sums stay finite.
 const MOST_ENERGY: f32 = 1e25;
 
-/// Doublings of the halves whose noise is most of what shows above a rung; none where those that may have more samples bring next to nothing of
-/// it. For a model that pools.
+/// Doublings of the halves whose noise is most of what shows above a rung; none where those that may have more samples
+/// bring next to nothing of it. For a model that pools.
 ///
-/// Every pixel around which noise showed was doubled before: of a sky behind the sun's disc, which has none, pixels had 262,144 samples, and a
-/// picture that takes 28 a pixel took 362 (`benches/results/energy.md`, whose noise shows).
+/// Only these are doubled, not every pixel around which noise shows: a sky behind the sun's disc has none of its own.
+/// Measured with every pixel doubled: 262,144 samples in pixels of that sky, and 362 a pixel for a picture that takes
+/// 28 (`benches/results/energy.md`, whose noise shows).
 pub(super) fn of_what_shows(
     film: &Film,
     judgement: &Judgement,
@@ -132,7 +133,8 @@ mod tests {
     use crate::integrator::PathSample;
     use glam::Vec3;
 
-    /// What shows around eight pixels is theirs: no pixel without noise gets a sample, and none is asked for once they have all they may.
+    /// What shows around eight pixels is theirs: no pixel without noise gets a sample, and none is asked for
+    /// once they have all they may.
     #[test]
     fn silent_surroundings_get_no_samples() {
         let is_noisy = |pixel: u32| (28..32).contains(&(pixel % 64)) && (30..32).contains(&(pixel / 64));
@@ -149,7 +151,8 @@ mod tests {
         assert!(of_what_shows(&film, &judgement, &forecast, rung, film.samples(0)).blocks.is_empty());
     }
 
-    /// A place that is two hundred times as loud, whose pixels have all they may, does not keep another from its samples.
+    /// A place that is two hundred times as loud, whose pixels have all they may, does not keep another from its
+    /// samples.
     #[test]
     fn a_place_beyond_help_does_not_hide_another() {
         let is_in =
@@ -179,7 +182,8 @@ mod tests {
         }
     }
 
-    /// Next to nothing is what faint noise around brings of what shows: it is left as it is, rather than sampled until it has all it may.
+    /// Next to nothing is what faint noise around brings of what shows: it is left as it is, rather than
+    /// sampled until it has all it may.
     #[test]
     fn faint_noise_is_left_where_the_loud_have_all_they_may() {
         let is_near =

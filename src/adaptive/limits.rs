@@ -6,8 +6,8 @@ use super::{Loop, StopReason};
 use crate::integrator::SamplePlan;
 
 impl Loop<'_> {
-    /// Limits that do not depend on the picture: a render ends at the boundary between plans from which it is done, with a
-    /// last look, nearest to its limit of time. The pilot is always traced.
+    /// Limits that do not depend on the picture: a render ends at the boundary between plans from which it is done,
+    /// with a last look, nearest to its limit of time. The pilot is always traced.
     pub(super) fn limit_reached(&self) -> Option<StopReason> {
         let RenderState { film, pending, plans, .. } = &self.state;
         if *plans == 0 {
@@ -37,8 +37,8 @@ impl Loop<'_> {
         samples * pixels * seconds_per_sample
     }
 
-    /// Samples that the budget has left, of all pixels; none where it is too little to look for: a cut that ends within a block of
-    /// samples leaves a few.
+    /// Samples that the budget has left, of all pixels; none where it is too little to look for: a cut that ends within
+    /// a block of samples leaves a few.
     pub(super) fn left_of_budget(&self) -> u64 {
         /// One sample for so many pixels.
         const PIXELS_WORTH_A_LOOK: u64 = 16;

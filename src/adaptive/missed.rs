@@ -1,9 +1,9 @@
 //! Edges of lamps that no sample has found.
 //!
-//! A pixel of which a bright lamp covers two per cent is white in truth, and dark in both halves until one sample in fifty meets the lamp:
-//! neither the halves' difference nor the raw mean tells of it. Its neighbour does, of which the lamp covers more. How coverage falls from
-//! a pixel to the next across an edge is known: it is the pixel filter's own shape. Of a lamp thinner than a pixel nothing tells which way
-//! it goes on: any neighbour may have as much of it.
+//! A pixel of which a bright lamp covers two per cent is white in truth, and dark in both halves until one sample in
+//! fifty meets the lamp: neither the halves' difference nor the raw mean tells of it. Its neighbour does, of which the
+//! lamp covers more. How coverage falls from a pixel to the next across an edge is known: it is the pixel filter's own
+//! shape. Of a lamp thinner than a pixel nothing tells which way it goes on: any neighbour may have as much of it.
 
 use crate::film::{Film, HalfPixel, Halves};
 use crate::sampler::{Half, PixelFilter};
@@ -23,7 +23,8 @@ pub(super) struct EdgeProfile {
 impl EdgeProfile {
     const CELLS: usize = 256;
 
-    /// `None` for a filter that tells of no neighbour, as the box, or has negative lobes.
+    /// Coverage across an edge under a pixel filter; `None` for one that tells of no neighbour, as the box, or has
+    /// negative lobes.
     pub(super) fn of(filter: PixelFilter) -> Option<Self> {
         let radius_px = filter.smooth_radius_px()?;
         let at = |cell: usize| radius_px * (2.0 * (cell as f32 + 0.5) / Self::CELLS as f32 - 1.0);
@@ -49,20 +50,20 @@ impl EdgeProfile {
 
 /// What the samples of each pixel have found, cd/m².
 pub(super) struct FoundLight {
-    /// Their mean luminance.
+    /// Mean luminance of the samples, cd/m².
     pub(super) mean_cd_m2: Plane,
-    /// That of a lamp before black which some of them have met: the mean square over the mean. Of a pixel that it covers by a twentieth,
-    /// the mean is a twentieth of this.
+    /// Luminance, cd/m², of a lamp before black which some of the samples have met: the mean square over the mean. Of a
+    /// pixel that it covers by a twentieth, the mean is a twentieth of this.
     lamp_cd_m2: Plane,
 }
 
 impl FoundLight {
-    /// Of a film, both halves together.
+    /// What the samples of a film have found, both halves together.
     pub(super) fn of_film(film: &Film, nits_per_unit: f64) -> Self {
         Self::of(film, nits_per_unit, |pixel| film.halves(pixel))
     }
 
-    /// Of a half; of the other one where it has no samples.
+    /// What the samples of a half have found; of the other one where it has none.
     pub(super) fn of_half(film: &Film, half: Half, nits_per_unit: f64) -> Self {
         Self::of(film, nits_per_unit, |pixel| Halves::Only(film.halves(pixel).half_or_other(half)))
     }
@@ -89,7 +90,7 @@ fn mean_square_luminance(half: &HalfPixel) -> f64 {
 pub(super) struct LampEdges<'a> {
     pub(super) profile: EdgeProfile,
     pub(super) film: &'a Film,
-    /// In the film, or in one of its halves.
+    /// What the film, or one of its halves, has found.
     pub(super) found: &'a FoundLight,
     /// What shines counts as a lamp from this luminance on.
     pub(super) lamps_from_cd_m2: f32,
@@ -101,8 +102,9 @@ impl LampEdges<'_> {
         self.missed_where(|pixel| !self.film.guides()[pixel].seen.shines())
     }
 
-    /// The same, whether samples have met it or not: counts that went by that would end where a rim was lucky, and make rims bright by 0.2 %
-    /// of the whole picture's light.
+    /// Luminance of lamps, cd/m², that is expected in each pixel beside what its samples have found, whether they have
+    /// met the lamp or not. Counts that go by [`Self::missed`] would end where a rim was lucky, and make rims bright by
+    /// 0.2 % of the whole picture's light.
     pub(super) fn expected(&self) -> Plane {
         self.missed_where(|_| true)
     }
@@ -120,7 +122,8 @@ impl LampEdges<'_> {
         let is_lamp = |at: (usize, usize)| shines(at) && light(at) > self.lamps_from_cd_m2;
         let mut missed = Plane::filled(width, height, 0.0);
         for lamp in (0..width * height).map(|pixel| (pixel % width, pixel / width)).filter(|&at| is_lamp(at)) {
-            // Far from any rim what shines is known as all else is: a picture, a screen or a sky has brighter places, too.
+            // Far from any rim what shines is known as all else is: a picture, a screen or a sky has brighter places,
+            // too.
             if around(lamp, RADIUS).all(shines) {
                 continue;
             }
@@ -137,7 +140,8 @@ impl LampEdges<'_> {
                 let coverage = light(lamp) / full;
                 let step_px = ((x.abs_diff(lamp.0) + y.abs_diff(lamp.1)) as f32).sqrt();
                 let coverage = if is_thin { coverage } else { self.profile.farther_out(coverage, step_px) };
-                // In the place of the pixel's own light; of a coverage that scatters about this by as much, after so many samples without a hit.
+                // In the place of the pixel's own light; of a coverage that scatters about this by as much, after so
+                // many samples without a hit.
                 let expected = (full - own).max(0.0) * coverage / (1.0 + samples * coverage);
                 missed.values_mut()[pixel] = expected.max(missed.get(x, y));
             }
@@ -146,16 +150,18 @@ impl LampEdges<'_> {
     }
 }
 
-/// How much brighter a picture is expected to be seen with light that may be missing, where that scatters exponentially about its mean.
+/// How much brighter a picture is expected to be seen with light that may be missing, where that scatters
+/// exponentially about its mean.
 pub(super) struct Darkness {
-    /// Display cd/m².
+    /// Mean of how much brighter, display cd/m².
     pub(super) mean: Plane,
-    /// Of its square, (cd/m²)².
+    /// Mean square of how much brighter, (cd/m²)² on the display.
     pub(super) mean_square: Plane,
 }
 
 impl Darkness {
-    /// `shown`: what is displayed of a pixel with so much more light, cd/m².
+    /// How much brighter a picture with this missing light, cd/m², is expected to be seen. `shown`: what is displayed
+    /// of a pixel with so much more light, cd/m².
     pub(super) fn of(missed: &Plane, shown: impl Fn(Pixel, f32) -> f32) -> Self {
         /// Means of the fifths of an exponential variable of mean 1.
         const FIFTHS: [f32; 5] = [0.107, 0.360, 0.700, 1.223, 2.610];
@@ -219,8 +225,8 @@ mod tests {
         );
     }
 
-    /// Of a lamp whose edge covers half of a column, the column beside it has what the filter says, less for samples without a
-    /// hit, and the one after that nothing.
+    /// Of a lamp whose edge covers half of a column, the column beside it has what the filter says, less for samples
+    /// without a hit, and the one after that nothing.
     #[test]
     fn light_is_missed_beside_lamps_alone() {
         const SIDE: usize = 8;
@@ -252,8 +258,8 @@ mod tests {
         assert!(edges(1e6).missed().values().iter().all(|&light| light == 0.0));
     }
 
-    /// A tube that covers an eighth of its pixels is met by one sample of each half in the upper rows, and by none below: the first of these may
-    /// have as much of it, and so may pixels to the side, but none farther away.
+    /// A tube that covers an eighth of its pixels is met by one sample of each half in the upper rows, and by none
+    /// below: the first of these may have as much of it, and so may pixels to the side, but none farther away.
     #[test]
     fn thin_lamps_may_go_on_either_way() {
         const SIDE: usize = 8;

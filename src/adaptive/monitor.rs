@@ -1,4 +1,4 @@
-//! How a render tells what it does, and is told to stop.
+//! How a render tells what it does, and is told to stop. Monitors decide nothing but whether it goes on.
 
 use super::StopReason;
 use super::judge::Judgement;
@@ -17,7 +17,8 @@ pub struct Progress {
     pub pixels: f64,
     /// Mean samples a pixel so far.
     pub mean_samples: f64,
-    /// Share of pixels whose predicted visibility is above the final target; `None` where the samples are too few to tell.
+    /// Share of pixels whose predicted visibility is above the final target; `None` where the samples are too few to
+    /// tell.
     pub visible_share: Option<f64>,
     /// Samples of the plan that comes next.
     pub next_samples: u64,
@@ -28,33 +29,35 @@ pub struct Progress {
 /// Whether a render goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Directive {
-    /// As planned.
+    /// The render goes on as planned.
     GoOn,
-    /// At once, with the picture so far.
+    /// The render ends at once, with the picture so far.
     Stop,
-    /// At once and without another look: somebody goes on from the state, or throws it away.
+    /// The render ends at once and without another look: somebody goes on from the state, or throws it away.
     Leave,
 }
 
-/// Is told how a render goes. Called from the render's own thread, except `samples_done`.
+/// A listener that is told how a render goes. Called from the render's own thread, except `samples_done`.
 pub trait Monitor: Sync {
-    /// After each look at the picture.
+    /// Hears how far the render is, after each look at the picture.
     fn looked(&self, progress: &Progress);
-    /// After each look, what was seen.
+    /// Hears what was seen, after each look.
     fn judged(&self, _state: &RenderState, _judgement: &Judgement) {}
-    /// While a plan is traced, from any thread.
+    /// Hears of samples while a plan is traced, from any thread.
     fn samples_done(&self, samples: u64);
-    /// Most samples of a batch, where somebody waits for the next moment between two. The picture does not depend on it.
+    /// Most samples of a batch, where somebody waits for the next moment between two. The picture does not depend on
+    /// it.
     fn most_samples_a_batch(&self) -> u64 {
         u64::MAX
     }
-    /// About once a second, between batches of samples; a render that is resumed from this state makes the same picture.
+    /// About once a second, between batches of samples; a render that is resumed from this state makes the same
+    /// picture.
     fn between_batches(&self, _state: &RenderState) -> Directive {
         Directive::GoOn
     }
-    /// At the end, with what a render to another limit would go on from.
+    /// Gets, at the end, what a render to another limit would go on from.
     fn ended(&self, _state: &RenderState, _reason: StopReason) {}
-    /// When a look of [`super::run`] fails, with what a render could go on from: who called it does not get the state.
+    /// Gets, when a look of [`super::run`] fails, what a render could go on from: who called it does not get the state.
     fn failed(&self, _state: &RenderState) {}
 }
 

@@ -1,5 +1,5 @@
-//! What comes after a look: the ladder's rungs, one after the other, and on each of them more samples until it is reached, no
-//! pixel stands out, and an audit agrees.
+//! What comes after a look: the ladder's rungs, one after the other, and on each of them more samples until it is
+//! reached, no pixel stands out, and an audit agrees.
 
 use super::audit::{Audit, MOST_INFLATION, audit, audit_unproven};
 use super::forecast::Forecast;
@@ -21,12 +21,12 @@ use std::time::Instant;
 
 /// No single pixel's measured amplitude may stay above this many times the target.
 const TOLERATED_PEAK: f64 = 4.0;
-/// Rungs above this are not audited, nor searched for pixels that stand out: their few samples say little, and the next rung asks
-/// again.
+/// Rungs above this are not audited, nor searched for pixels that stand out: their few samples say little, and
+/// the next rung asks again.
 const HIGHEST_AUDITED_RUNG: f64 = 4.0;
 
-/// A rung at threshold or below is far where it needs so many times the samples that are there, which are twice as many at most after
-/// the next plan.
+/// A rung at threshold or below is far where it needs so many times the samples that are there, which are twice as many
+/// at most after the next plan.
 const FAR: f64 = 3.0;
 /// Share of the picture where it may be nearer.
 const ELSEWHERE: f64 = 0.1;
@@ -87,9 +87,9 @@ impl Loop<'_> {
         }))
     }
 
-    /// Enters a plan that takes no look, where there is one; false when it is time for a look. Such plans are for lamps that are known to be
-    /// there, for what is left of a budget where that is hardly more than a look costs, and, by raw noise alone, between two looks at a picture
-    /// that is denoised.
+    /// Enters a plan that takes no look, where there is one; false when it is time for a look. Such plans are for lamps
+    /// that are known to be there, for what is left of a budget where that is hardly more than a look costs, and, by
+    /// raw noise alone, between two looks at a picture that is denoised.
     pub(super) fn plans_without_a_look(&mut self) -> Result<bool, JudgeError> {
         let left = self.left_of_budget();
         if let Some(plan) = self.plan_to_meet_lamps(left) {
@@ -155,9 +155,10 @@ impl Loop<'_> {
         }
     }
 
-    /// Whether a raw picture on the way to threshold has its first samples and no more, and the budget so little left that a look would cost
-    /// more than knowing where it goes is worth: that is a few per cent of it. Nor would it be right: what a look gives to pixels that have
-    /// met no light of a lamp beside them makes stars too bright, by 13 % at 24 samples a pixel.
+    /// Whether a raw picture on the way to threshold has its first samples and no more, and the budget so little left
+    /// that a look would cost more than knowing where it goes is worth: that is a few per cent of it. Nor would it be
+    /// right: what a look gives to pixels that have met no light of a lamp beside them makes stars too bright, by
+    /// 13 % at 24 samples a pixel.
     fn has_little_left_after_its_first_samples(&self, left: u64) -> bool {
         const WORTH_A_LOOK: f64 = 4.0 * SAMPLES_OF_A_RAW_LOOK;
         let (film, limits) = (&self.state.film, &self.settings.limits);
@@ -179,8 +180,8 @@ impl Loop<'_> {
         (2 * (film.total_samples() / pixels) as u32).max(limits.pilot()).min(most)
     }
 
-    /// More samples for a rung; `None` when it is reached or no pixel may have more. `left`: of the budget. An audit may make
-    /// `judgement` stricter.
+    /// More samples for a rung; `None` when it is reached or no pixel may have more. `left`: of the budget. An audit
+    /// may make `judgement` stricter.
     fn plan_towards(
         &mut self,
         rung: f64,
@@ -221,7 +222,8 @@ impl Loop<'_> {
         Ok(plan)
     }
 
-    /// What the cheapest counts that reach a rung add to those that are there; `None` where even counts cost hardly more.
+    /// What the cheapest counts that reach a rung add to those that are there; `None` where even counts cost hardly
+    /// more.
     fn cheapest(&mut self, rung: f64, judgement: &Judgement) -> Result<Option<SamplePlan>, JudgeError> {
         let limits = &self.settings.limits;
         let film = &self.state.film;
@@ -289,7 +291,8 @@ impl Loop<'_> {
     }
 }
 
-/// Whether a rung needs, nearly everywhere, so much more than is there that the next plan does not depend on where the way ends.
+/// Whether a rung needs, nearly everywhere, so much more than is there that the next plan does not depend on where the
+/// way ends.
 fn is_far(judgement: &Judgement, rung: f64) -> bool {
     judgement.predicted.quantile(ELSEWHERE).powi(2) > FAR * rung * rung
 }

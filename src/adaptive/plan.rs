@@ -1,4 +1,5 @@
-//! Which pixels get how many more samples. Decisions only: nothing here traces. How plans are made of blocks, and cut, is in `blocks`.
+//! Which pixels get how many more samples. Decisions only: nothing here traces. How plans are made of blocks, and cut,
+//! is in `blocks`.
 //!
 //! Counts double, because trickles would be decided by luck. Where the need of a pixel lies between two doublings, the
 //! two are mixed over 2×2 quads so that the mean of 1/n, which is what the eye's pooling sees, is right: rounding up
@@ -20,9 +21,9 @@ use fechner_perception::{PIXELS_A_TASK, Plane};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Doublings that one plan gives a pixel at most where that costs no more than a look. Otherwise there is one: the pixel's
-/// variance, and what stratification makes of it, are looked at again in between, since stratification pays more the more
-/// samples there are.
+/// Doublings that one plan gives a pixel at most where that costs no more than a look. Otherwise there is one: the
+/// pixel's variance, and what stratification makes of it, are looked at again in between, since stratification pays
+/// more the more samples there are.
 pub(super) const MOST_DOUBLINGS_AT_ONCE: u32 = 3;
 
 /// What a look at the picture costs, in samples for every pixel, about.
@@ -37,8 +38,9 @@ const SMALL_DOUBLING: u64 = 32;
 /// Gap to the cheapest counts that is enough: rounding to doublings and the confidence margin cost more than 1 %.
 const ENOUGH_GAP: f64 = 0.01;
 
-/// Samples of each half that every pixel has before any has the rest of its pilot: who watches has a picture of 2 + 2 early, and
-/// one that is about even on the way to 8 + 8. Single samples at first would be as many sums again in a farm's files.
+/// Samples of each half that every pixel has before any has the rest of its pilot: who watches has a picture
+/// of 2 + 2 early, and one that is about even on the way to 8 + 8. Single samples at first would be as many
+/// sums again in a farm's files.
 const FIRST_PASS_SAMPLES_A_HALF: u32 = 2;
 
 /// What a film lacks of the first samples of every pixel: 8 + 8, or `most_samples` in all where they are fewer.
@@ -71,7 +73,8 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
     plan
 }
 
-/// As many more samples for every pixel, `samples` in all, where it may have them. Those that are too few for one more each go by chance.
+/// A plan of equally many more samples for every pixel, `samples` in all, where it may have them. Those that are too
+/// few for one more each go by chance.
 pub(super) fn even_plan(film: &Film, samples: u64, max_samples: u32) -> SamplePlan {
     let each = (samples / film.pixel_count().max(1) as u64) as u32;
     let more = |range: Range<u32>| {
@@ -164,8 +167,8 @@ pub fn needed_samples(
 /// Each half scales its share by what the other half knows of the pixel itself (counts go as the standard deviation,
 /// Neyman 1934), if it was judged to plan.
 ///
-/// A plan that costs no more than a look asks for so much that no other should be needed: the last few pixels that miss the
-/// target narrowly, or whose half doubling was rounded away, would otherwise take several.
+/// A plan that costs no more than a look asks for so much that no other should be needed: the last few pixels that miss
+/// the target narrowly, or whose half doubling was rounded away, would otherwise take several.
 pub(super) fn adaptive_plan(
     film: &Film,
     judgement: &Judgement,
@@ -219,12 +222,13 @@ impl Haste {
 /// Margins that are tried, one after the other.
 const MARGINS: [f64; 6] = [1.0, 1.05, 1.1, 1.2, 1.4, 1.8];
 
-/// Doublings of both halves of a pixel that should have `wanted` samples if its variance were `pooled`; `own` is the larger of
-/// that and what each half may know of the pixel itself.
+/// Doublings of both halves of a pixel that should have `wanted` samples if its variance were `pooled`; `own` is the
+/// larger of that and what each half may know of the pixel itself.
 fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own: [f32; 2], haste: Haste) -> [u32; 2] {
-    // A half that falls far behind makes the other's samples worthless, yet one that follows is decided by its own data after all,
-    // through the other's count: on the lognormal field of the tests a lag of at most one doubling costs 0.50 % of the energy, two
-    // 0.24 %, any 0.14 % (each ± 0.12), on a caustic two cost 0.32 %, any 0.27 % (± 0.06), for level samples (`benches/results/energy.md`).
+    // A half that falls far behind makes the other's samples worthless, yet one that follows is decided by its own data
+    // after all, through the other's count: on the lognormal field of the tests a lag of at most one doubling costs
+    // 0.50 % of the energy, two 0.24 %, any 0.14 % (each ± 0.12), on a caustic two cost 0.32 %, any 0.27 % (± 0.06),
+    // for level samples (`benches/results/energy.md`).
     Half::BOTH.map(|half| {
         let taken = film.half(half)[pixel].taken.max(1);
         let harder = if pooled > 0.0 { f64::from(own[half.index()] / pooled).max(1.0).sqrt() } else { 1.0 };
@@ -233,11 +237,12 @@ fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own:
     })
 }
 
-/// Doublings for every pixel that shows so many times what it may, `excess` (no more than 1: none): as many as bring that down
-/// and one more, since it is what a single pixel of the halves' difference says, while they are next to nothing of the film's samples;
-/// else one.
+/// Doublings for every pixel that shows so many times what it may, `excess` (no more than 1: none): as many as bring
+/// that down and one more, since it is what a single pixel of the halves' difference says, while they are next to
+/// nothing of the film's samples; else one.
 ///
-/// Asked for one to three at once without regard to the excess, a lamp's edge took seven looks for six pixels (`benches/results/equal-time.md`).
+/// Asked for one to three at once without regard to the excess, a lamp's edge took seven looks for six pixels
+/// (`benches/results/equal-time.md`).
 pub fn doubling_of(film: &Film, max_samples: u32, excess: impl Fn(usize) -> f64 + Sync) -> SamplePlan {
     let doublings = |pixel: usize, most: u32| {
         let excess = excess(pixel);
@@ -254,7 +259,7 @@ pub fn doubling_of(film: &Film, max_samples: u32, excess: impl Fn(usize) -> f64 
     doubling_plan(film, max_samples, |pixel| [doublings(pixel, most); 2])
 }
 
-/// So many doublings of each half of each pixel, up to `max_samples`.
+/// A plan of so many doublings of each half of each pixel, up to `max_samples`.
 pub(super) fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2] + Sync) -> SamplePlan {
     let of_pixel = |pixel: usize| {
         let doublings = doublings(pixel);

@@ -21,8 +21,8 @@ pub enum Pursuit {
 }
 
 impl Pursuit {
-    /// How fast eyes move, deg/s, that look at each pixel of a picture of scene cd/m², which should have no noise: it would stand
-    /// out, too.
+    /// How fast eyes move, deg/s, that look at each pixel of a picture of scene cd/m², which should have no
+    /// noise: it would stand out, too.
     pub(super) fn eye_velocity_deg_s(
         &self,
         rgb_cd_m2: &[[f32; 3]],

@@ -25,8 +25,8 @@ const CLAMPED_AT: f64 = 0.95;
 /// Tungsten's least squared mean to divide by.
 const LEAST_SQUARED_MEAN: f64 = 1e-3;
 
-/// The next samples by a rule, `left` in all at most; empty when the rule would stop. `exposure` turns scene units into shares of
-/// display white.
+/// The next samples by a rule, `left` in all at most; empty when the rule would stop. `exposure` turns scene units
+/// into shares of display white.
 pub fn rival_plan(rule: RivalRule, film: &Film, exposure: f64, left: u64, max_samples: u32) -> SamplePlan {
     let plan = match rule {
         RivalRule::Relative { threshold } => {
@@ -62,7 +62,8 @@ fn push_samples(plan: &mut SamplePlan, film: &Film, pixel: usize, samples: u32) 
     }
 }
 
-/// A step for each pixel that is active, or as much of one as it may have; what is left goes evenly where it is too little for whole ones.
+/// A step for each pixel that is active, or as much of one as it may have; what is left goes evenly where it is
+/// too little for whole ones.
 fn step_where(film: &Film, max_samples: u32, left: u64, active: &[bool]) -> SamplePlan {
     let allowed = |pixel: usize| max_samples.saturating_sub(film.samples(pixel));
     let may_have = |&pixel: &usize| active[pixel] && allowed(pixel) > 0;
@@ -73,8 +74,8 @@ fn step_where(film: &Film, max_samples: u32, left: u64, active: &[bool]) -> Samp
     plan
 }
 
-/// Cycles' test: |I − A| summed over RGB, over S where the RGB sum S is at least 1 and over √S below, with its least count
-/// of max(4, ⌈16 / threshold^0.3⌉) samples and its 3×3 dilation.
+/// Cycles' test: |I − A| summed over RGB, over S where the RGB sum S is at least 1 and over √S below, with its least
+/// count of max(4, ⌈16 / threshold^0.3⌉) samples and its 3×3 dilation.
 fn relative_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
     let least = (16.0 / threshold.powf(0.3)).ceil().max(4.0);
     let (a, b) = (film.half(Half::A), film.half(Half::B));

@@ -1,7 +1,9 @@
-//! Samples for pixels in which a lamp smaller than they is known to be, and the noise of known things that few samples have met.
+//! Samples for pixels in which a lamp smaller than they is known to be, and the noise of known things that few samples
+//! have met.
 //!
-//! Of a lamp that covers a thirtieth of a pixel the first sixteen samples find nothing in six pixels of ten, and their halves agree that it is black.
-//! Where it is, and how much it covers, is known before the first sample, so the count is no matter of luck.
+//! Of a lamp that covers a thirtieth of a pixel the first sixteen samples find nothing in six pixels of ten, and
+//! their halves agree that it is black. Where it is, and how much it covers, is known before the first sample, so the
+//! count is no matter of luck.
 
 use super::missed::FoundLight;
 use super::settings::Limits;
@@ -17,14 +19,14 @@ const FEWEST_MEETINGS: f64 = 1.0;
 const FOUND_ANYWAY: f32 = 0.5;
 /// A pixel gets no more samples than this, and none for a lamp that these would not meet once.
 const MOST_SAMPLES: f64 = 4096.0;
-/// What less of a pixel's samples meets is left to chance: most pixels never have so many. The pixel filter's tails hold as little of the sun, and
-/// show white after its first meeting.
+/// What less of a pixel's samples meets is left to chance: most pixels never have so many. The pixel filter's tails
+/// hold as little of the sun, and show white after its first meeting.
 const LEAST_SHARE: f32 = 1.0 / 65_536.0;
-/// Of the pilot's samples, what this may take.
+/// Share of the pilot's samples that this may take.
 const MOST_OF_PILOT: f64 = 0.5;
 
-/// Samples that each pixel should have to meet lamps that cover such shares of them, for as many meetings as half of a pilot's samples and the
-/// budget of `mean_samples` a pixel allow. `None` where they do not allow any.
+/// Samples that each pixel should have to meet lamps that cover such shares of them, for as many meetings as half of a
+/// pilot's samples and the budget of `mean_samples` a pixel allow. `None` where they do not allow any.
 ///
 /// By the scene and the limits alone: a render that goes on asks for what it has.
 pub(super) fn samples_to_meet(shares: &[f32], limits: &Limits) -> Option<Vec<u32>> {
@@ -50,12 +52,13 @@ fn wanted(share: f32, meetings: f64) -> u32 {
     if is_small { (meetings / f64::from(share)).min(MOST_SAMPLES).ceil() as u32 } else { 0 }
 }
 
-/// How wrong each pixel is expected to be seen of which samples have met known things fewer than [`MEETINGS`] times: the mean square, (cd/m²)² on
-/// the display, over how often chance lets so many samples meet them (Poisson's distribution). Once they are met oftener, their own scatter
-/// tells. `None` where none are known.
+/// How wrong each pixel is expected to be seen of which samples have met known things fewer than [`MEETINGS`] times:
+/// the mean square, (cd/m²)² on the display, over how often chance lets so many samples meet them (Poisson's
+/// distribution). Once they are met oftener, their own scatter tells. `None` where none are known.
 ///
-/// Of forty lamps far out of focus few neighbours had met one, and renders asked for 8 stopped at 51 to 53 with 46 % of the light missing.
-/// `found`: what is found besides. `shown`: what is displayed of a pixel's luminance, both cd/m².
+/// Neighbours alone do not tell: of forty lamps far out of focus few neighbours have met one. Measured without: renders
+/// asked for visibility 8 stop at 51 to 53 with 46 % of the light missing. `found`: what is found besides. `shown`:
+/// what is displayed of a pixel's luminance, both cd/m².
 pub(super) fn unmet_noise(
     film: &Film,
     found: &FoundLight,
@@ -77,8 +80,8 @@ pub(super) fn unmet_noise(
     }))
 }
 
-/// How often a pixel's samples are expected to have met its known things, where that is fewer than [`MEETINGS`] times; `None` where it has none,
-/// or less than [`LEAST_SHARE`].
+/// How often a pixel's samples are expected to have met its known things, where that is fewer than [`MEETINGS`] times;
+/// `None` where it has none, or less than [`LEAST_SHARE`].
 pub(super) fn few_meetings(film: &Film, pixel: usize) -> Option<f64> {
     let share = film.known_things.as_ref()?.share(pixel);
     let expected = f64::from(share) * f64::from(film.samples(pixel));
@@ -115,8 +118,8 @@ mod tests {
         }
     }
 
-    /// A lamp that half a per cent of samples meets brings 1 unit. Of sixteen samples, most meet it not at all: what is missing is all of it, and
-    /// now and then there is too much. Of 2000, ten do, and their own scatter tells.
+    /// A lamp that half a per cent of samples meets brings 1 unit. Of sixteen samples, most meet it not at all: what is
+    /// missing is all of it, and now and then there is too much. Of 2000, ten do, and their own scatter tells.
     #[test]
     fn what_few_samples_met_is_noise() {
         let noise = |samples: u32, shown: fn(f32) -> f32| {

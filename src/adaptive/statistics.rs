@@ -1,9 +1,9 @@
 //! Variance that can be trusted at 16 samples and on heavy tails.
 //!
-//! A count that is chosen by the same samples that it extends biases the picture dark: pixels stop when they were lucky.
-//! So the count of a half depends only on (a) the variance of the pixel's neighbours, the pixel itself left out, and (b)
-//! the pixel's own variance as the *other* half saw it. Measured on synthetic fields, this leaves +0.26 ± 0.1 % of bias
-//! on a lognormal of coefficient of variation 4, where a pixel's own variance costs −13.6 %.
+//! A count that is chosen by the same samples that it extends biases the picture dark: pixels stop when they were
+//! lucky. So the count of a half depends only on (a) the variance of the pixel's neighbours, the pixel itself left out,
+//! and (b) the pixel's own variance as the *other* half saw it. Measured on synthetic fields, this leaves +0.26 ± 0.1 %
+//! of bias on a lognormal of coefficient of variation 4, where a pixel's own variance costs −13.6 %.
 
 mod pooling;
 
@@ -20,9 +20,9 @@ pub struct ChannelStatistics {
     /// Pooled over the neighbours of like surface, the pixel itself left out.
     pub pooled: Plane,
     /// Ratio of the halves' squared difference to what independent samples would show, pooled: below 1 where
-    /// stratification pays, and where light is not as unevenly spread as a display that clips it was told.
+    /// stratification pays, and where a display that clips light shows less of its spread than its variance tells.
     pub low_discrepancy_factor: Plane,
-    /// The same factor with the pixel itself counted in. For reports, not for decisions.
+    /// Ratio of [`Self::low_discrepancy_factor`] with the pixel itself counted in. For reports, not for decisions.
     pub factor_with_own: Plane,
 }
 
@@ -36,7 +36,7 @@ impl ChannelStatistics {
 /// Statistics of luminance and the two chromatic channels.
 #[derive(Clone, Debug)]
 pub struct SampleStatistics {
-    /// By channel, in the order of [`crate::film::opponent`].
+    /// Statistics by channel, in the order of [`crate::film::opponent`].
     pub channels: [ChannelStatistics; CHANNELS],
 }
 
@@ -50,18 +50,19 @@ pub struct DifferenceOnDisplay {
     pub most_factor: f32,
 }
 
-/// Most times of what independent samples would differ by: stratified samples do better, hardly ever worse.
+/// Most times of what independent samples would differ by that the halves count as differing: stratified samples do
+/// better, hardly ever worse.
 pub const MOST_FACTOR: f32 = 1.2;
 
 impl SampleStatistics {
-    /// Pools a film. `scale` turns each pixel's scene variance, by channel, into what counts: displayed variance, since a
-    /// lamp's border scatters far above what the display can show, and its dark neighbours must not inherit that.
+    /// Pools a film. `scale` turns each pixel's scene variance, by channel, into what counts: displayed variance, since
+    /// a lamp's border scatters far above what the display can show, and its dark neighbours must not inherit that.
     pub fn of(film: &Film, scale: &[Plane; CHANNELS]) -> Self {
         Self::by(film, scale, MOST_FACTOR, |_, evidence| evidence)
     }
 
-    /// The same, with the halves' differences as the display shows them. Of what is mostly beyond white, variance times a scale tells up to 7
-    /// times the noise that is seen (`benches/results/beyond-white.md`).
+    /// Pools a film as [`Self::of`], with the halves' differences as the display shows them: of what is mostly beyond
+    /// white, variance times a scale tells up to 7 times the noise that is seen (`benches/results/beyond-white.md`).
     pub fn of_displayed(film: &Film, scale: &[Plane; CHANNELS], difference: &DifferenceOnDisplay) -> Self {
         let DifferenceOnDisplay { squared, expected, most_factor } = difference;
         Self::by(film, scale, *most_factor, |pixel, mut evidence| {
@@ -96,8 +97,8 @@ impl SampleStatistics {
         Self { channels }
     }
 
-    /// Variance of one sample that a half of the film decides by: pooled, or the pixel's own variance seen by the other half where
-    /// that is larger. `scale` as in [`Self::of`].
+    /// Variance of one sample that a half of the film decides by: pooled, or the pixel's own variance seen by the other
+    /// half where that is larger. `scale` as in [`Self::of`].
     pub fn for_half(&self, film: &Film, scale: &Plane, half: Half, channel: usize) -> Plane {
         let pooled = &self.channels[channel].pooled;
         let other = film.half(half.other());
@@ -107,7 +108,7 @@ impl SampleStatistics {
         })
     }
 
-    /// The same with what stratification makes of it.
+    /// Variance of one sample that a half decides by, [`Self::for_half`], with what stratification makes of it.
     pub(super) fn stratified_variance_for_half(&self, film: &Film, scale: &Plane, half: Half, channel: usize) -> Plane {
         let factor = &self.channels[channel].low_discrepancy_factor;
         self.for_half(film, scale, half, channel).combined(factor, |variance, factor| variance * factor)
@@ -125,8 +126,8 @@ pub(super) fn by_channel<T: Send>(of: impl Fn(usize) -> T + Sync) -> [T; CHANNEL
     [luminance, red_green, yellow_violet]
 }
 
-/// Variance of the picture's luminance in (scene cd/m²)²: each pixel's own scatter, and what stratification makes of it around
-/// the pixel. For reports, not for decisions.
+/// Variance of the picture's luminance in (scene cd/m²)²: each pixel's own scatter, and what stratification makes of it
+/// around the pixel. For reports, not for decisions.
 pub fn picture_variance(film: &Film, nits_per_unit: f64) -> Plane {
     let own = film.estimate(nits_per_unit).variance_of_mean;
     let factor = SampleStatistics::of(film, &scene_units(film)).channels[0].factor_with_own.clone();
@@ -156,7 +157,8 @@ fn cautious_variance(pixel: &HalfPixel, channel: usize) -> f64 {
 /// What one pixel has to say about variance in one channel.
 #[derive(Clone, Copy)]
 struct PixelEvidence {
-    /// Sample variance from the squared deviations of both halves about their own means; of two single samples, from their difference.
+    /// Sample variance from the squared deviations of both halves about their own means; of two single
+    /// samples, from their difference.
     variance: f64,
     /// Squared half difference; none where a half is empty.
     squared_difference: f64,
@@ -274,7 +276,8 @@ mod tests {
         assert!(excess < 1.05, "maximum of pooled and own spends {excess}");
     }
 
-    /// Halves that differ by far more than their scatter tells are believed up to 1.2 times it, and up to what is asked for as displayed.
+    /// Halves that differ by far more than their scatter tells are believed up to 1.2 times it, and up to what
+    /// is asked for as displayed.
     #[test]
     fn halves_are_believed_up_to_a_factor() {
         let grey = |half: Half, random: f32| Vec3::splat(0.1 * random + if half == Half::A { 1.0 } else { 3.0 });

@@ -1,4 +1,5 @@
-//! When a render is done: why it ended, when a visibility is reached, and whether uneven counts are worth it.
+//! When a render is done: why it ended, when a visibility is reached, and whether uneven counts are worth it. What is
+//! traced until then is left to `plan`.
 
 use super::judge::Judgement;
 use crate::film::Film;
@@ -6,7 +7,8 @@ use fechner_perception::Plane;
 
 /// Share of pixels that may remain above the target when the loop stops.
 pub const TOLERATED_SHARE: f64 = 0.001;
-/// No pixel of the predicted map, which holds what the eye pools around each, may stay above this many times the target.
+/// No pixel of the predicted map, which holds what the eye pools around each, may stay above this many times the
+/// target.
 const TOLERATED_WORST: f64 = 2.0;
 /// Below this predicted saving the loop samples uniformly: its estimates err by more.
 pub(super) const LEAST_SAVING: f64 = 0.05;
@@ -14,8 +16,9 @@ pub(super) const LEAST_SAVING: f64 = 0.05;
 /// Why a render ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
-    /// Predicted visibility is at most the target on 99.9 % of the picture and nowhere above twice the target; of adaptive sampling, after
-    /// an audit has agreed where one is made; none is where the last sample of a budget has reached it.
+    /// Predicted visibility is at most the target on 99.9 % of the picture and nowhere above twice the
+    /// target; of adaptive sampling, after an audit has agreed where one is made; none is where the last
+    /// sample of a budget has reached it.
     Visibility,
     /// The time was up.
     Time,
@@ -29,13 +32,13 @@ pub enum StopReason {
     Rule,
     /// The monitor asked for it.
     Interrupted,
-    /// It is the sum of several, and what was asked for is not reached.
+    /// The film is the sum of several, and what was asked for is not reached.
     Merged,
 }
 
-/// Whether a rung's stop is met: no more than the tolerated share of pixels is above it, and none is far above. Never where too few samples tell,
-/// and never for 0, where only other limits count: a lamp that 16 samples of a pixel have missed leaves no noise at all, and an even
-/// render of 4096 ended there, black, with 11 seeds of 12.
+/// Whether a rung's stop is met: no more than the tolerated share of pixels is above it, and none is far above. Never
+/// where too few samples tell, and never for 0, where only other limits count: a lamp that 16 samples of a pixel have
+/// missed leaves no noise at all. Measured without: an even render of 4096 ends there, black, with 11 seeds of 12.
 pub fn is_reached(judgement: &Judgement, rung: f64) -> bool {
     if rung <= 0.0 {
         return false;

@@ -27,12 +27,13 @@ pub(super) fn film_of(color: impl Fn(u32, f32) -> Vec3) -> Film {
     film_of_lamps(color, |_| false)
 }
 
-/// The same of pixels of which some shine.
+/// A pilot, square, of `color(pixel, random in −1..1)`, of whose pixels some shine.
 pub(super) fn film_of_lamps(color: impl Fn(u32, f32) -> Vec3, shines: impl Fn(u32) -> bool) -> Film {
     film_of_halves([PILOT_SAMPLES_A_HALF; 2], shines, |pixel, _, random| color(pixel, random))
 }
 
-/// The same of so many samples of each half of every pixel.
+/// A square film of so many samples of each half of every pixel, some of which shine, of
+/// `color(pixel, half, random in −1..1)`.
 pub(super) fn film_of_halves(
     samples: [u32; 2],
     shines: impl Fn(u32) -> bool,

@@ -1,7 +1,7 @@
 //! Where a picture that is denoised gets samples between one look at it and the next.
 //!
-//! A look says whose noise shows; how much each pixel gets is decided, as samples come, by raw noise, which costs a tenth of a
-//! look to know. Not for pictures that stay raw: these have `plan`.
+//! A look says whose noise shows; how much each pixel gets is decided, as samples come, by raw noise, which costs a
+//! tenth of a look to know. Not for pictures that stay raw: these have `plan`.
 
 use super::gain::{EVEN_ENOUGH, GROWTH, defended, gain, share_of_even};
 use super::judge::Judgement;
@@ -12,25 +12,27 @@ use crate::film::Film;
 use crate::integrator::SamplePlan;
 use serde::{Deserialize, Serialize};
 
-/// Samples for every pixel that a plan adds at least, while its pixels may have so many: variances of four samples are not worth
-/// being asked more often.
+/// Samples for every pixel that a plan adds at least, while its pixels may have so many: variances of four samples are
+/// not worth being asked more often.
 const LEAST_PLAN: f64 = 6.0;
-/// What a look costs with Open Image Denoise, in samples for every pixel, about: 5 to 15 (`benches/results/denoising.md`).
+/// What a look costs with Open Image Denoise, in samples for every pixel, about: 5 to 15
+/// (`benches/results/denoising.md`).
 const SAMPLES_OF_AN_OIDN_LOOK: f64 = 10.0;
 /// With the built-in filter: 2 to 4.
 const SAMPLES_OF_A_BUILTIN_LOOK: f64 = 3.0;
-/// Samples for every pixel between two looks at the least, and before the first one: spent on more of them, what the dearer look costs is
-/// spent better. The same with the built-in filter; whether more of its looks would pay was not measured.
+/// Samples for every pixel between two looks at the least, and before the first one: spent on more of them,
+/// what the dearer look costs is spent better. The same with the built-in filter; whether more of its looks
+/// would pay was not measured.
 const LEAST_SAMPLES_BETWEEN_LOOKS: f64 = SAMPLES_OF_AN_OIDN_LOOK;
 /// Most that comes between two looks, as a share of what is there.
 const MOST_GROWTH: f64 = 3.0;
-/// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes 0.8 to 2.7 times
-/// better at 32 samples, one of them 4.4 times at 8 (`benches/results/denoising.md`).
+/// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes
+/// 0.8 to 2.7 times better at 32 samples, one of them 4.4 times at 8 (`benches/results/denoising.md`).
 const MOST_GAIN: f64 = 3.0;
 /// Doublings of a pixel in one plan.
 const MOST_DOUBLINGS: u32 = 2;
-/// What is in a pixel's window above the visibility asked for, as a share of what is in the window that has most, from which on
-/// its noise counts.
+/// What is in a pixel's window above the visibility asked for, as a share of what is in the window that has most, from
+/// which on its noise counts.
 const LEAST_BLAME: f32 = 0.1;
 
 /// What a look at a denoised picture costs, in samples for every pixel, about.
@@ -53,7 +55,7 @@ pub struct UntilLook {
 }
 
 impl UntilLook {
-    /// Before the first look.
+    /// When to look before the first look.
     pub(super) fn first(film: &Film) -> Self {
         let pixels = film.pixel_count();
         let earliest = LEAST_SAMPLES_BETWEEN_LOOKS * pixels as f64;
@@ -61,14 +63,15 @@ impl UntilLook {
         Self { to_blame: vec![true; pixels], earliest: earliest as u64, latest: latest as u64 }
     }
 
-    /// A look before anything more is traced: whoever goes on from a film that a look has ended must see what that one saw.
+    /// A look before anything more is traced: whoever goes on from a film that a look has ended must see what that one
+    /// saw.
     pub(super) fn at_once(film: &Film) -> Self {
         let now = film.total_samples();
         Self { to_blame: vec![true; film.pixel_count()], earliest: now, latest: now }
     }
 
-    /// After a look, while some of the picture is above `visibility`: until that may be reached, if errors fell as 1/n (measured
-    /// are 1/n^0.35 to 1/n^0.9), and at least until as many samples are traced as a look costs.
+    /// When to look after a look, while some of the picture is above `visibility`: once that may be reached, if errors
+    /// fell as 1/n (measured are 1/n^0.35 to 1/n^0.9), and at least until as many samples are traced as a look costs.
     pub(super) fn after(film: &Film, judgement: &Judgement, visibility: f64) -> Self {
         let to_blame = to_blame(judgement, visibility);
         let present: f64 = wanted(&to_blame).map(|pixel| f64::from(film.samples(pixel))).sum();
@@ -91,17 +94,17 @@ impl UntilLook {
         film.total_samples() + self.to_blame.len() as u64 > self.earliest
     }
 
-    /// Whether there is one where there may: not yet while raw noise is so far above a visibility that no denoiser can bring the
-    /// picture to it.
+    /// Whether there is one where there may: not yet while raw noise is so far above a visibility that no denoiser
+    /// can bring the picture to it.
     pub(super) fn must_look(&self, film: &Film, raw: &Judgement, visibility: f64) -> bool {
         let is_late = film.total_samples() + self.to_blame.len() as u64 > self.latest;
         is_late || raw.predicted.quantile(1.0 - TOLERATED_SHARE) <= MOST_GAIN * visibility
     }
 
-    /// More samples for those to blame; at most `left` in all. `judgement` may be of the raw picture.
+    /// A plan of more samples for the pixels to blame; at most `left` in all. `judgement` may be of the raw picture.
     ///
-    /// What raw noise would show at a pixel decides, not what is left of it: that is pooled over a degree and tells no noisy pixel
-    /// from its neighbours. Counts go as the root of that energy plus the picture's mean ([`defended`]).
+    /// What raw noise would show at a pixel decides, not what is left of it: that is pooled over a degree and tells no
+    /// noisy pixel from its neighbours. Counts go as the root of that energy plus the picture's mean ([`defended`]).
     pub(super) fn plan(&self, film: &Film, judgement: &Judgement, max_samples: u32, left: u64) -> SamplePlan {
         let raw = judgement.energy_of(&judgement.pooled_variance_per_sample);
         let due = if self.may_look(film) { self.latest } else { self.earliest };
@@ -110,9 +113,9 @@ impl UntilLook {
     }
 }
 
-/// Which pixels' noise makes that some are above a visibility: these and those in whose window some are, and not just these, whose
-/// own noise may be the least of it. Sampled alone, 1.3 % of `turntable` (64×36, Open Image Denoise) had 16384 samples and stayed
-/// above 2.
+/// Which pixels' noise makes that some are above a visibility: these and those in whose window some are, and not just
+/// these, whose own noise may be the least of it. Measured with just these: 1.3 % of `turntable` (64×36, Open Image
+/// Denoise) take 16384 samples and stay above 2.
 fn to_blame(judgement: &Judgement, visibility: f64) -> Vec<bool> {
     let above = judgement.predicted.map(|predicted| f32::from(f64::from(predicted) > visibility));
     let shares = judgement.thresholds.in_bands.pooled(&above);
@@ -131,8 +134,9 @@ fn is_for_all(to_blame: &[bool]) -> bool {
     2 * to_blame.iter().filter(|&&is_to_blame| is_to_blame).count() > to_blame.len()
 }
 
-/// Doublings, again and again for the half of the pixels where one more sample takes away most of e/n, until the plan is large
-/// enough; among those to blame alone when they are few. As many for all where other than even counts would hardly be better.
+/// Doublings, again and again for the half of the pixels where one more sample takes away most of e/n, until the
+/// plan is large enough; among those to blame alone when they are few. As many for all where other than even
+/// counts would hardly be better.
 fn plan_by_energy(film: &Film, energies: &[f64], to_blame: &[bool], max_samples: u32, left: u64) -> SamplePlan {
     let pixels = energies.len();
     let present: f64 = wanted(to_blame).map(|pixel| f64::from(film.samples(pixel))).sum();
@@ -168,8 +172,8 @@ mod tests {
     use fechner_perception::Plane;
     use glam::Vec3;
 
-    /// Where every place is about as noisy, counts stay even; where one half of the picture is noisier, it gets the samples; few
-    /// pixels that are to blame get theirs alone.
+    /// Where every place is about as noisy, counts stay even; where one half of the picture is noisier, it gets the
+    /// samples; few pixels that are to blame get theirs alone.
     #[test]
     fn counts_are_even_unless_others_are_much_better() {
         let film = film_of(|_, random| Vec3::splat(1.0 + random));
@@ -200,8 +204,8 @@ mod tests {
         (film, judgement)
     }
 
-    /// The first look is not at the pilot, and the next one not before as much is traced as a look costs; far from the target it comes
-    /// later, but what is there is at most four times as much then.
+    /// The first look is not at the pilot, and the next one not before as much is traced as a look costs; far from the
+    /// target it comes later, but what is there is at most four times as much then.
     #[test]
     fn looks_are_as_far_apart_as_they_cost() {
         let pixels = 64 * 64;
@@ -219,8 +223,8 @@ mod tests {
         assert!(UntilLook::after(&film, &judgement, 2.0).may_look(&film), "nothing shows");
     }
 
-    /// What raw noise already says costs no look: while it is above three times the visibility asked for there is none, though not for
-    /// ever.
+    /// What raw noise already says costs no look: while it is above three times the visibility asked for there is
+    /// none, though not for ever.
     #[test]
     fn hopeless_looks_are_left_out() {
         let until_look = |film: &Film| UntilLook::first(film);
@@ -248,7 +252,8 @@ mod tests {
         assert!(!is_sampled(60, 5) && !is_sampled(5, 60) && !is_sampled(60, 60));
     }
 
-    /// Nothing that is above the target waits for a larger place to come down, which may have all the samples that it may have.
+    /// Nothing that is above the target waits for a larger place to come down, which may have all the samples that it
+    /// may have.
     #[test]
     fn a_lone_pixel_is_sampled_beside_a_large_place() {
         let is_sampled = sampled(|x, y| (x, y) == (5, 5) || (x > 52 && y > 52));

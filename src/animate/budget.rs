@@ -1,10 +1,10 @@
 //! A budget of samples for a whole shot, spent where most would be seen.
 //!
-//! Pilots of fixed seed, of frames where the light changes and of others spread over the shot, say how many samples a pixel a
-//! frame needs for a visibility. One visibility for all frames fits the budget, none below the one that is asked for; what a
-//! frame needs for it is its share, and what is left over goes where pilots may be wrong by most. Frames stay
-//! independent of each other: they know their share from the track. Not for shots that only have a visibility to reach: their
-//! frames know by themselves when they are done.
+//! Pilots of fixed seed, of frames where the light changes and of others spread over the shot, say how many samples a
+//! pixel a frame needs for a visibility. One visibility for all frames fits the budget, none below the one that is
+//! asked for; what a frame needs for it is its share, and what is left over goes where pilots may be wrong by most.
+//! Frames stay independent of each other: they know their share from the track. Not for shots that only have a
+//! visibility to reach: their frames know by themselves when they are done.
 
 use super::pilots::{Neighbours, piloted_frames};
 use super::track::Track;
@@ -18,12 +18,13 @@ use crate::scene::load::LoadError;
 use fechner_perception::tone::ToneOperator;
 use std::time::Instant;
 
-/// Visibilities at which needs are asked; between them, and beyond, they go as a power. At higher ones most pixels have what they
-/// need from the pilot on, which says little of lower ones.
+/// Visibilities at which needs are asked; between them, and beyond, they go as a power. At higher ones most pixels have
+/// what they need from the pilot on, which says little of lower ones.
 const ASKED: [f64; 5] = [8.0, 2.0, 0.5, 0.125, 0.03125];
 const LAST_ASKED: usize = ASKED.len() - 1;
-/// Times the need that a frame may take at first of what is left over: within [`KNOWN_SAMPLES`] frames of two shots took 0.85 to
-/// 1.22 times what their pilots said, and twice as many at twice that, where pilots have not met what is rare.
+/// Times the need that a frame may take at first of what is left over: within [`KNOWN_SAMPLES`] frames of two shots
+/// took 0.85 to 1.22 times what their pilots said, and twice as many at twice that, where pilots have not met what is
+/// rare.
 const MARGIN: f64 = 1.3;
 /// Needs up to here pilots know; beyond it their error goes as the need.
 const KNOWN_SAMPLES: f64 = 2.0 * PILOT_SAMPLES_A_PIXEL as f64;
@@ -126,13 +127,15 @@ impl Needs {
         high.exp2()
     }
 
-    /// Samples a pixel that each frame needs for the visibility that fits so many on average, or for `asked`, below which none goes on.
+    /// Samples a pixel that each frame needs for the visibility that fits so many on average, or for `asked`,
+    /// below which none goes on.
     pub fn for_budget(&self, mean_samples: f64, asked: f64) -> Vec<f64> {
         self.samples(self.visibility_for(mean_samples).max(asked))
     }
 
-    /// Whole samples a pixel for each frame, by what it needs on the way to the visibility `asked`; what is left over is for what
-    /// pilots err by. They add up to the budget of `mean_samples` for each, unless that is more than pixels may have.
+    /// Whole samples a pixel for each frame, by what it needs on the way to the visibility `asked`; what is
+    /// left over is for what pilots err by. They add up to the budget of `mean_samples` for each, unless that
+    /// is more than pixels may have.
     pub fn shares(&self, mean_samples: u32, asked: f64) -> Vec<u32> {
         let count = self.ln_samples.len();
         if mean_samples <= PILOT_SAMPLES_A_PIXEL {
@@ -225,7 +228,8 @@ mod tests {
         assert_eq!(needs.shares(5000, 0.0), [1000; 3]);
     }
 
-    /// Of a budget beyond the needs for what is asked, frames whose needs pilots know take little, and the others the rest.
+    /// Of a budget beyond the needs for what is asked, frames whose needs pilots know take little, and the others the
+    /// rest.
     #[test]
     fn what_is_left_over_goes_where_pilots_know_least() {
         let needs = needs_at_2(&[20.0, 20.0, 320.0]);

@@ -1,8 +1,9 @@
 //! Where the viewers of a shot look, frame by frame, as an eye tracker says it.
 //!
-//! A table of lines `frame,x,y`: places in pixels of the rendered picture from its upper left corner. Several lines of one frame
-//! are several viewers, or an eye on its way; what is nearest to any of them counts. In a frame without a line nothing is known and
-//! everything may be looked at. A place outside the picture is refused: it is most often of a picture of another size.
+//! A table of lines `frame,x,y`: places in pixels of the rendered picture from its upper left corner. Several lines of
+//! one frame are several viewers, or an eye on its way; what is nearest to any of them counts. In a frame without a
+//! line nothing is known and everything may be looked at. A place outside the picture is refused: it is most often of
+//! a picture of another size.
 
 use fechner_perception::eccentricity::Gaze;
 use std::collections::BTreeMap;
@@ -16,7 +17,7 @@ pub struct GazeTrack {
 /// A line that is none of a gaze track's.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GazeError {
-    /// It cannot be understood.
+    /// The line cannot be understood.
     #[error("line {line}: \"{text}\" is not a frame's number and a place in pixels, such as 12,640.5,360")]
     NoGaze {
         /// Its number, from 1.
@@ -24,7 +25,7 @@ pub enum GazeError {
         /// What it says.
         text: String,
     },
-    /// It looks past the picture.
+    /// The gaze looks past the picture.
     #[error(
         "line {line}: {},{} is outside {width}x{height}: give places in pixels of the rendered picture, and no line at all for a frame \
          in which a viewer looks elsewhere", .gaze.x_px, .gaze.y_px
@@ -42,7 +43,8 @@ pub enum GazeError {
 }
 
 impl GazeTrack {
-    /// Reads a table for pictures of this size. Empty lines, what follows # and names in the first line that has anything else are passed over.
+    /// Reads a table for pictures of this size. Empty lines, what follows # and names in the first line that has
+    /// anything else are passed over.
     ///
     /// # Errors
     /// [`GazeError`] for the first line that cannot be understood or is of no place in the picture.
@@ -120,7 +122,7 @@ mod tests {
         }
     }
 
-    /// Such a frame was rendered as if nothing were known of it, without a word.
+    /// Regression: such a frame was rendered as if nothing were known of it, without a word.
     #[test]
     fn places_outside_the_picture_are_refused_by_their_line() {
         for outside in ["4,640.5,20", "4,20,481", "4,-1,20"] {

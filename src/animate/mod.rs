@@ -1,9 +1,9 @@
 //! Shots: frames of a scene that moves, each rendered until what is left cannot be seen in motion.
 //!
-//! A frame is a pure function of the scene, its number and the shot's settings, so frames can be made in any order and on any
-//! machine. What they share is the [`track`]: how light the view is over the shot, by which the tone operator is fitted
-//! once (or, for operators with eyes that adapt, frame by frame), so that exposure does not flicker with the noise. It is
-//! made from small pictures of fixed seed, and made again to the same bytes wherever it is missing.
+//! A frame is a pure function of the scene, its number and the shot's settings, so frames can be made in any order and
+//! on any machine. What they share is the [`track`]: how light the view is over the shot, by which the tone operator is
+//! fitted once (or, for operators with eyes that adapt, frame by frame), so that exposure does not flicker with the
+//! noise. It is made from small pictures of fixed seed, and made again to the same bytes wherever it is missing.
 //!
 //! A [`budget`] of samples for the whole shot is spread by the track as well.
 //!
@@ -92,8 +92,8 @@ pub struct ShotSettings {
 }
 
 impl ShotSettings {
-    /// Of frame 0 alone, spread adaptively, raw, for eyes that rest anywhere and are not told to pause. `trace` has the seed that frames'
-    /// own are made from, `nits_per_unit` is the luminance in cd/m² of RGB (1, 1, 1).
+    /// Settings of frame 0 alone, spread adaptively, raw, for eyes that rest anywhere and are not told to pause.
+    /// `trace` has the seed that frames' own are made from, `nits_per_unit` is the luminance in cd/m² of RGB (1, 1, 1).
     pub fn new(
         frames_per_second: f64,
         trace: TraceSettings,
@@ -148,7 +148,7 @@ impl ShotSettings {
 /// One finished frame.
 #[derive(Debug)]
 pub struct RenderedFrame {
-    /// Its samples and the last look at them.
+    /// Samples of the frame and the last look at them.
     pub rendered: Rendered,
     /// How what it shows moves to and from its neighbours.
     pub velocity: VelocityMap,
@@ -158,7 +158,7 @@ pub struct RenderedFrame {
 pub struct FrameScenes {
     /// One frame earlier.
     pub previous: Arc<Scene>,
-    /// At the frame's time.
+    /// The scene at the frame's time.
     pub now: Arc<Scene>,
     /// One frame later.
     pub next: Arc<Scene>,

@@ -1,4 +1,5 @@
-//! Names of a sequence's files: `shot.####.exr`, one `#` for each digit of the frame's number at the least.
+//! Names of a sequence's files: `shot.####.exr`, one `#` for each digit of the frame's number at the least. Which
+//! frames there are is left to the caller.
 
 use crate::output::folder_of;
 use std::path::{Path, PathBuf};
@@ -53,8 +54,8 @@ impl FrameName {
         Ok(numbers)
     }
 
-    /// A file of the whole sequence: the pattern without its number, with another ending. What stands between number and ending stays:
-    /// it may be all that tells the left eye's frames from the right one's.
+    /// A file of the whole sequence: the pattern without its number, with another ending. What stands between number
+    /// and ending stays: it may be all that tells the left eye's frames from the right one's.
     pub fn of_shot(&self, ending: &str) -> PathBuf {
         let (folder, start) = self.split();
         let stem = start.trim_end_matches(['.', '_', '-']);

@@ -1,4 +1,5 @@
-//! Which frames of a shot are piloted for a budget: those where its light changes, and others at equal steps.
+//! Which frames of a shot are piloted for a budget: those where its light changes, and others at equal steps. What
+//! pilots find is left to `budget`.
 
 use super::track::{Track, goal_of};
 use super::{SceneSource, ShotSettings};
@@ -34,7 +35,8 @@ pub(super) fn piloted_frames(
     Ok(where_light_changes(&ln_light, most_for_light(frames, shot.limits.mean_samples)))
 }
 
-/// Mean luminance of every frame, cd/m²: from the track where it has all, else by brief looks at all, which can be compared.
+/// Mean luminance of every frame, cd/m²: from the track where it has all, else by brief looks at all, which can be
+/// compared.
 fn light_of_frames(
     source: &dyn SceneSource,
     shot: &ShotSettings,
@@ -66,8 +68,8 @@ fn most_for_light(frames: usize, mean_samples: Option<u32>) -> usize {
     afforded.clamp(PILOTED_FRAMES as u64, MOST_PILOTED_FRAMES as u64) as usize
 }
 
-/// Both ends; then, again and again, the frame whose light is farthest from what lies between piloted ones, up to `most`; then the middles
-/// of the longest stretches without any.
+/// Both ends; then, again and again, the frame whose light is farthest from what lies between piloted ones, up to
+/// `most`; then the middles of the longest stretches without any.
 fn where_light_changes(ln_light: &[f64], most: usize) -> Vec<usize> {
     let last = ln_light.len() - 1;
     let mut piloted = vec![0, last];
@@ -122,7 +124,7 @@ fn longest_stretch(piloted: &[usize]) -> Option<Stretch> {
     stretches.max_by_key(|stretch| stretch.frames()).filter(|stretch| stretch.frames() > 1)
 }
 
-/// Between which piloted frames a frame lies.
+/// The piloted frames between which a frame lies.
 pub(super) struct Neighbours {
     /// Place of the one before among all piloted ones.
     pub(super) before: usize,

@@ -1,8 +1,8 @@
 //! The luminance track of a shot: how light the view is in every frame, and how the tone operator is set for it.
 //!
-//! Made before the frames, from small pictures of one fixed seed, with as many samples as it takes until they are steady. Operators whose
-//! eyes adapt go through the shot in time; all others are fitted once, to frames from all over it, so that exposure stands still while frames
-//! and noise change, and look at no more of them.
+//! Made before the frames, from small pictures of one fixed seed, with as many samples as it takes until they are
+//! steady. Operators whose eyes adapt go through the shot in time; all others are fitted once, to frames from all over
+//! it, so that exposure stands still while frames and noise change, and look at no more of them.
 
 use super::budget::Needs;
 use super::{SceneSource, ShotSettings, spread_over};
@@ -17,14 +17,15 @@ use fechner_perception::tone::{AdaptationState, Goal, SavedTone, SceneLight, Ton
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Change of what an eye adapts to, by a doubling of the last samples, from which on noise takes more of it than few pixels would add: on our
-/// other scenes it is below 0.025, and a coarse glimpse adapts eyes to 1 to 5 % more light, 18 % on `scenes/many-lights.toml`.
+/// Change of what an eye adapts to, by a doubling of the last samples, from which on noise takes more of it than few
+/// pixels would add: on our other scenes it is below 0.025, and a coarse glimpse adapts eyes to 1 to 5 % more light,
+/// 18 % on `scenes/many-lights.toml`.
 const UNSETTLED: f32 = 0.05;
 
 /// One frame of the track.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrackFrame {
-    /// Its number.
+    /// Number of the frame.
     pub frame: u32,
     /// The scene that it was made from.
     pub scene: ContentHash,
@@ -34,7 +35,7 @@ pub struct TrackFrame {
     pub eye: Option<AdaptationState>,
     /// The tone operator as set for this frame.
     pub fitted: SavedTone,
-    /// Its share of the shot's budget, samples a pixel, where there is one.
+    /// Share of the frame in the shot's budget, samples a pixel, where there is one.
     pub mean_samples: Option<u32>,
 }
 
@@ -43,12 +44,13 @@ pub struct TrackFrame {
 pub struct Track {
     /// What besides the scenes it depends on, in words.
     pub made_for: String,
-    /// In order.
+    /// The frames in order.
     pub frames: Vec<TrackFrame>,
 }
 
 impl Track {
-    /// Looks at the frames of a shot that the operator needs; `say` is told how many frames are done, from 1 on again in a second round.
+    /// Looks at the frames of a shot that the operator needs; `say` is told how many frames are done, from 1
+    /// on again in a second round.
     ///
     /// # Errors
     /// For scenes that cannot be read.
@@ -87,7 +89,8 @@ impl Track {
         Ok(Self { made_for: made_for(shot, operator), frames })
     }
 
-    /// Gives each frame its share of a budget of so many samples a pixel on average, on the way to the visibility `asked`.
+    /// Gives each frame its share of a budget of so many samples a pixel on average, on the way to the visibility
+    /// `asked`.
     pub fn spread(&mut self, needs: &Needs, mean_samples: u32, asked: f64) {
         for (frame, share) in self.frames.iter_mut().zip(needs.shares(mean_samples, asked)) {
             frame.mean_samples = Some(share);
@@ -121,7 +124,8 @@ fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
         operator.name(),
         shot.adapted_to_cd_m2,
         shot.limits.mean_samples,
-        // Whether frames may be paused, where they are looked at and what denoises them decides what they need of a budget.
+        // Whether frames may be paused, where they are looked at and what denoises them decides what they need of a
+        // budget.
         shot.limits.mean_samples.map(|_| {
             let denoiser = shot.denoiser.as_ref().map(Denoiser::name);
             ("pilots where light changes", shot.sampling, shot.pausable, shot.limits, gaze_hash(shot), denoiser)
@@ -141,7 +145,7 @@ struct FrameFit {
     fitted: SavedTone,
 }
 
-/// The same for all frames, by those that were looked at.
+/// Fits the operator once for all frames, to those that were looked at.
 fn one_fit_for_all(shot: &ShotSettings, operator: &dyn ToneOperator, looks: Vec<Option<Look>>) -> Vec<FrameFit> {
     let goals: Vec<Option<Goal>> = looks.iter().map(|look| look.as_ref().map(|look| look.goal)).collect();
     let looks: Vec<Look> = looks.into_iter().flatten().collect();
@@ -290,7 +294,8 @@ mod tests {
         track.frames.into_iter().next().expect("a frame")
     }
 
-    /// `render --sampling uniform --spp 256` has its white at 395.5 cd/m²; of six seeds a track's is at 393 to 425. By 8 samples it was at 140.
+    /// `render --sampling uniform --spp 256` has its white at 395.5 cd/m²; of six seeds a track's is at 393 to 425.
+    /// Regression: by a pilot of 8 samples it was at 140.
     #[test]
     fn a_shot_is_exposed_as_its_frames_are() {
         let fitted = first_frame("many-lights.toml", "constant", (128, 96)).fitted.restore();
@@ -299,8 +304,8 @@ mod tests {
         assert!((white_cd_m2 / 395.5 - 1.0).abs() < 0.12, "white at {white_cd_m2} cd/m²");
     }
 
-    /// What lights the theatre few samples find: `render --sampling uniform --spp 512` adapts eyes to 0.0059 cd/m². By 8 samples it was 0.0012,
-    /// of six seeds by 64 it is 0.0026 to 0.0028.
+    /// What lights the theatre few samples find: `render --sampling uniform --spp 512` adapts eyes to 0.0059 cd/m².
+    /// Regression: by 8 samples it was 0.0012; of six seeds by 64 it is 0.0026 to 0.0028.
     #[test]
     fn eyes_adapt_to_a_dark_view_as_in_its_frames() {
         let goal = first_frame("theatre-door.toml", "pattanaik00", (128, 72)).goal.expect("was looked at");

@@ -1,9 +1,9 @@
 //! Velocity maps: where the surface point that a pixel shows was one frame ago, and where it will be.
 //!
-//! Exact: the point keeps its place on its triangle or sphere, and the other frames' scenes and cameras say where that is,
-//! whatever moved it (camera, object, skin, morph). Backgrounds turn with the camera and with their own pictures. Surfaces that
-//! blend are there where they cover half or more. Mirrors and glass have the motion of their
-//! own surface, or, by [`VelocityMap::of_images`], that of what they show.
+//! Exact: the point keeps its place on its triangle or sphere, and the other frames' scenes and cameras say where that
+//! is, whatever moved it (camera, object, skin, morph). Backgrounds turn with the camera and with their own pictures.
+//! Surfaces that blend are there where they cover half or more. Mirrors and glass have the motion of their own surface,
+//! or, by [`VelocityMap::of_images`], that of what they show.
 
 mod image;
 
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 /// Motion of what each pixel's centre shows when the shutter opens, in pixels, x to the right and y down; row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VelocityMap {
-    /// From this frame to the next one: where it will be, less where it is.
+    /// Motion from this frame to the next one, px: where a thing will be, less where it is.
     pub to_next: Vec<Vec2>,
     /// Where it was one frame ago, less where it is.
     pub to_previous: Vec<Vec2>,
@@ -28,14 +28,15 @@ pub enum VelocityOf {
     /// The mirror's and the glass's own.
     #[default]
     Surface,
-    /// That of what is seen in it.
+    /// Motion of what is seen in the surface.
     Image,
 }
 
 /// What a camera ray meets, by what moves with it.
 enum Seen {
     Triangle(Hit),
-    /// Number of the sphere, and the normal at the point: along the sphere's own axes where its turning can be seen, else in the world.
+    /// Number of the sphere, and the normal at the point: along the sphere's own axes where its turning can
+    /// be seen, else in the world.
     Sphere(usize, Normal),
     /// Nothing but the surroundings, in this direction of their own picture.
     Background(Vec3),
@@ -50,14 +51,15 @@ enum Normal {
 }
 
 impl VelocityMap {
-    /// For the film of a tracer, and the same scene one frame earlier and later: equal objects, meshes of equal triangles.
-    /// What an object of another number or triangle would be has no motion.
+    /// Velocities for the film of a tracer, and the same scene one frame earlier and later: equal objects, meshes of
+    /// equal triangles. What an object of another number or triangle would be has no motion.
     pub fn new(tracer: &PathTracer, previous: &Scene, next: &Scene) -> Self {
         let cameras = [&previous.camera, &tracer.world().scene().camera, &next.camera];
         Self::seen_by(cameras, tracer, previous, next)
     }
 
-    /// The same by other cameras than the scenes' own: one frame earlier, now, one frame later.
+    /// Velocities as [`Self::new`] finds them, by other cameras than the scenes' own: one frame earlier, now, one frame
+    /// later.
     pub fn seen_by(cameras: [&Camera; 3], tracer: &PathTracer, previous: &Scene, next: &Scene) -> Self {
         let settings = tracer.settings();
         let area = settings.film_area();
@@ -68,7 +70,8 @@ impl VelocityMap {
         })
     }
 
-    /// From where what each pixel shows at its centre is in the next frame and in the one before; without a place it has no motion.
+    /// From where what each pixel shows at its centre is in the next frame and in the one before; without a place it
+    /// has no motion.
     fn by_pixel(area: Crop, places: impl Fn(Vec2) -> [Option<Vec2>; 2] + Sync) -> Self {
         let motions: Vec<[Vec2; 2]> = (0..area.width * area.height)
             .into_par_iter()

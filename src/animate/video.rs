@@ -1,7 +1,7 @@
 //! Moving pictures as YUV4MPEG2 (.y4m): raw frames that every encoder and player of free software reads.
 //!
-//! 8 bits, no chroma subsampling, ITU-R BT.709 in the limited range (16 to 235); of these the header says the range, and has no word for the matrix.
-//! Not for keeping: three bytes a pixel and frame.
+//! 8 bits, no chroma subsampling, ITU-R BT.709 in the limited range (16 to 235); of these the header says the range,
+//! and has no word for the matrix. Not for keeping: three bytes a pixel and frame.
 
 use crate::output::fraction;
 use fechner_perception::photometry::luminance;

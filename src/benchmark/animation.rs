@@ -1,5 +1,6 @@
-//! What motion hides: the frames of a shot by the rule for motion and by the rule for stills, both asked for one visibility,
-//! the shot with as many samples as the first as its budget, and evenly sampled frames of the same judged quality.
+//! What motion hides: the frames of a shot by the rule for motion and by the rule for stills, both asked for one
+//! visibility, the shot with as many samples as the first as its budget, and evenly sampled frames of the same judged
+//! quality.
 //!
 //! Judged as a video by ColorVideoVDP, which no rule optimises, against frames of many samples by other seeds. Not for
 //! stills.
@@ -65,7 +66,8 @@ pub struct AnimationRow {
     pub still_jod: f64,
     /// Samples a pixel with which evenly sampled frames look like those of the rule for motion.
     pub uniform_spp: Reached,
-    /// Mean samples a pixel of the shot that has those of the rule for motion as its budget, and no visibility to stop at.
+    /// Mean samples a pixel of the shot that has those of the rule for motion as its budget, and no visibility to stop
+    /// at.
     pub budget_spp: f64,
     /// What its frames look like as a video.
     pub budget_jod: f64,
@@ -73,9 +75,10 @@ pub struct AnimationRow {
     pub uniform_spp_of_budget: Reached,
     /// Visibility of the error in single frames by the rule for motion, at the 99th percentile.
     pub visibility: f64,
-    /// Root mean square visibility of what changes from frame to frame by the rule for motion, what moves brought together.
+    /// Root mean square visibility of what changes from frame to frame by the rule for motion, what moves brought
+    /// together.
     pub flicker: f64,
-    /// The same of even sampling whose single frames are as visible; `None` where none that was tried is.
+    /// [`Self::flicker`] of even sampling whose single frames are as visible; `None` where none that was tried is.
     pub uniform_flicker: Option<f64>,
 }
 
@@ -84,7 +87,7 @@ pub struct AnimationRow {
 pub struct AnimationResults {
     /// What every frame but the references' is denoised with.
     pub denoiser: Option<String>,
-    /// One a scene and rate.
+    /// Rows, one a scene and rate.
     pub rows: Vec<AnimationRow>,
 }
 

@@ -1,4 +1,4 @@
-//! The arms of the benchmark.
+//! The arms of the benchmark: rules by which samples are spread, each with its knob. They are run by `runner`.
 
 use super::Subject;
 use crate::adaptive::settings::{AllocationRule, LoopSettings, RivalRule, Sampling, THRESHOLD};
@@ -10,9 +10,9 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(into = "&'static str")]
 pub enum Arm {
-    /// The same everywhere: the power of two nearest to what converged variances ask for.
+    /// Uniform: the same count everywhere, the power of two nearest to what converged variances ask for.
     Uniform,
-    /// The same everywhere, in the time that the loop took as asked.
+    /// Uniform: the same count everywhere, in the time that the loop took as asked.
     UniformEqualTime,
     /// Cycles' rule, its threshold searched.
     Relative,
@@ -32,8 +32,8 @@ pub enum Arm {
     NoPooling,
     /// Ablation: as [`Arm::NoPooling`], and texture hides nothing; its target searched.
     NoMasking,
-    /// Ablation: as [`Arm::NoPooling`], with masking on threshold versus intensity in place of contrast sensitivity; its
-    /// target searched.
+    /// Ablation: as [`Arm::NoPooling`], with masking on threshold versus intensity in place of contrast
+    /// sensitivity; its target searched.
     NoCsf,
     /// Ablation: each pixel's count by its own threshold, not the convex optimum.
     LocalRule,
@@ -71,7 +71,7 @@ impl Arm {
         Arm::ToThreshold,
         Arm::Oracle,
     ];
-    /// Those of the quick suite.
+    /// The arms of the quick suite.
     pub const QUICK: [Arm; 7] =
         [Arm::Uniform, Arm::Relative, Arm::Tvi, Arm::Default, Arm::AsAsked, Arm::UniformEqualTime, Arm::Oracle];
 
@@ -99,11 +99,12 @@ impl Arm {
         }
     }
 
-    /// Where the search of the arm's knob begins; `None` for arms without one. Every knob is like an error: what is left
-    /// goes as the knob does.
+    /// Where the search of the arm's knob begins; `None` for arms without one. Every knob is like an error: what is
+    /// left goes as the knob does.
     ///
-    /// Uniform sampling takes the power of two that is nearest, as the loop's pixels do: between them the sequence's points lie less evenly, and
-    /// 14 samples of `complementary-lamps` had 1.19 times the squared error of 16, times the samples.
+    /// Uniform sampling takes the power of two that is nearest, as the loop's pixels do: between them the
+    /// sequence's points lie less evenly, and 14 samples of `complementary-lamps` have 1.19 times the squared error
+    /// of 16, times the samples.
     pub(super) fn first_knob(self, subject: &Subject, uniform_spp: f64) -> Option<f64> {
         match self {
             Arm::Relative => Some(0.01 * subject.visibility),
@@ -116,7 +117,8 @@ impl Arm {
         }
     }
 
-    /// Whether the knob is turned until the picture is at v\*. What uniform sampling is off by is scaled away: its error is that of its count.
+    /// Whether the knob is turned until the picture is at v\*. What uniform sampling is off by is scaled away: its
+    /// error is that of its count.
     pub(super) fn is_searched(self) -> bool {
         self != Arm::Uniform
     }
@@ -172,8 +174,8 @@ impl From<Arm> for &'static str {
     }
 }
 
-/// Most mean samples of an arm: one that needs more than this has lost anyway. Never fewer than the pilot, before which no rule can
-/// choose.
+/// Most mean samples of an arm: one that needs more than this has lost anyway. Never fewer than the pilot, before
+/// which no rule can choose.
 fn most_samples(uniform_spp: f64, pilot_samples: u32) -> u32 {
     ((4.0 * uniform_spp).ceil() as u32).max(pilot_samples)
 }

@@ -37,7 +37,7 @@ pub struct Curve {
     pub scene: String,
     /// Arm.
     pub arm: Arm,
-    /// In the order of the render.
+    /// Points in the order of the render.
     pub points: Vec<CurvePoint>,
 }
 

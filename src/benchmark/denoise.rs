@@ -1,8 +1,8 @@
 //! Denoised pictures: what the law says of them against what is true, and what samples cost to a quality.
 //!
-//! [`denoising`] renders the reference of each scene, then (1) judges uniform renders that are denoised and compares tile by
-//! tile with what can truly be seen of their error, and (2) spends growing budgets by three rules and reads off where the
-//! denoised pictures reach a quality by metrics that none of them optimises (`race.rs`). Not for animation.
+//! [`denoising`] renders the reference of each scene, then (1) judges uniform renders that are denoised and compares
+//! tile by tile with what can truly be seen of their error, and (2) spends growing budgets by three rules and reads off
+//! where the denoised pictures reach a quality by metrics that none of them optimises (`race.rs`). Not for animation.
 
 use super::keep::kept_or_made;
 use super::metrics::Metrics;
@@ -27,10 +27,11 @@ use std::time::Instant;
 const TILE: usize = 16;
 /// Budgets, mean samples a pixel.
 const BUDGETS: [u32; 7] = [4, 8, 16, 32, 64, 128, 256];
-/// What a rule that ends by its own threshold may take, as a multiple of the budget that the threshold is made for: scenes that need more
-/// for it than others are to end by the rule all the same.
+/// What a rule that ends by its own threshold may take, as a multiple of the budget that the threshold is made for:
+/// scenes that need more for it than others are to end by the rule all the same.
 const ROOM_OF_A_RIVAL: u32 = 8;
-/// Cycles' measure of a single sample's noise, about: what 16 samples a pixel leave is 0.1, and it falls as the root of the count.
+/// Cycles' measure of a single sample's noise, about: what 16 samples a pixel leave is 0.1, and it falls as the root of
+/// the count.
 const RELATIVE_NOISE_OF_ONE_SAMPLE: f64 = 0.4;
 /// The visibility that our rule is told to aim at in a race: so low that it is the budget that ends it.
 const OUT_OF_REACH: f64 = 0.01;
@@ -63,13 +64,15 @@ pub struct Calibration {
     pub seed: u64,
     /// Spearman's rank correlation of predicted and true visibility over tiles; `None` where all tiles are alike.
     pub rank_correlation: Option<f64>,
-    /// Root of the ratio of predicted to true energy over the picture; `None`, as in the next, where nothing is truly wrong.
+    /// Root of the ratio of predicted to true energy over the picture; `None`, as in the next, where nothing is truly
+    /// wrong.
     pub predicted_over_true: Option<f64>,
-    /// The same by the variance alone.
+    /// Root of the ratio of energy that the variance alone predicts to true energy over the picture; `None`
+    /// where nothing is truly wrong.
     pub variance_over_true: Option<f64>,
     /// Share of tiles called fine, and proven, whose true visibility is above 1.5 times the target.
     pub wrong_share: f64,
-    /// The same among tiles called fine without proof.
+    /// Share of tiles called fine without proof whose true visibility is above 1.5 times the target.
     pub wrong_unproven_share: f64,
     /// Share of all tiles that are called fine.
     pub fine_share: f64,
@@ -79,26 +82,26 @@ pub struct Calibration {
     pub truly_wrong_share: f64,
     /// Squared bias over squared variance by band.
     pub bias_factors: Vec<f64>,
-    /// ColorVideoVDP of the raw and of the denoised picture.
+    /// ColorVideoVDP of the raw picture, JOD.
     pub jod_raw: f64,
-    /// Denoised.
+    /// ColorVideoVDP of the denoised picture, JOD.
     pub jod: f64,
-    /// FLIP of the raw and of the denoised picture.
+    /// Mean FLIP of the raw picture.
     pub flip_raw: f64,
-    /// Denoised.
+    /// Mean FLIP of the denoised picture.
     pub flip: f64,
     /// Seconds of denoising the mean and both halves over those of tracing.
     pub overhead: f64,
 }
 
-/// Everything that was found.
+/// The results of a run over scenes and denoisers.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct DenoisingResults {
-    /// One a scene, denoiser, count and seed.
+    /// Calibrations, one a scene, denoiser, count and seed.
     pub calibrations: Vec<Calibration>,
-    /// One a scene, denoiser and rule.
+    /// Races, one a scene, denoiser and rule.
     pub races: Vec<Race>,
-    /// Of those, one a rule and quality.
+    /// Means of the races, one a rule and quality.
     pub race_means: Vec<RaceMean>,
 }
 

@@ -1,8 +1,8 @@
 //! How much a shot's error changes from frame to frame, beyond what moves.
 //!
-//! The error of a frame less the error of the one before, brought together along the exact velocity maps, over √2 so that
-//! errors that have nothing to do with each other count as one frame's, in threshold units. Decisions that jump from frame to
-//! frame would show here. Luminance only. Not a prediction of what is seen in motion: see
+//! The error of a frame less the error of the one before, brought together along the exact velocity maps, over √2 so
+//! that errors that have nothing to do with each other count as one frame's, in threshold units. Decisions that jump
+//! from frame to frame would show here. Luminance only. Not a prediction of what is seen in motion: see
 //! [`fechner_perception::sequence`].
 
 use super::MAIN_COVERAGE;
@@ -40,7 +40,7 @@ pub(super) struct FlickerJudge {
 }
 
 impl FlickerJudge {
-    /// For frames of displayed RGB and the tracers and scenes that they were made with.
+    /// A judge for frames of displayed RGB and the tracers and scenes that they were made with.
     pub(super) fn new(
         reference: &[Vec<f32>],
         tracers: &[PathTracer],
@@ -65,7 +65,7 @@ impl FlickerJudge {
         Ok(Self { size, reference, thresholds, before })
     }
 
-    /// Of frames of displayed RGB.
+    /// Steadiness of frames of displayed RGB.
     pub(super) fn judge(&self, frames: &[Vec<f32>]) -> Steadiness {
         let errors: Vec<Plane> = frames
             .iter()

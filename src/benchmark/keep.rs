@@ -1,4 +1,5 @@
-//! What was found, kept in the folder of results, so that a run that was broken off goes on: figures as JSON, pixels under a seal.
+//! What was found, kept in the folder of results, so that a run that was broken off goes on: figures as JSON, pixels
+//! under a seal.
 
 use crate::json_file;
 use crate::sealed::{Kind, SealedError};
@@ -14,8 +15,8 @@ static PIXELS: Kind = Kind {
     remedy: "no other program should write to it",
 };
 
-/// What [`keep_pixels`] wrote; `None` unless it is there, whole and of so many values. What is there and refused is told of, since it is
-/// made anew.
+/// What [`keep_pixels`] wrote; `None` unless it is there, whole and of so many values. What is there and refused is
+/// told of, since it is made anew.
 pub(super) fn kept_pixels(file: &Path, count: usize, say: &dyn Fn(&str)) -> Option<Vec<f32>> {
     let read = || -> Result<Vec<f32>, SealedError> {
         let values: Vec<f32> = PIXELS.decode(file, &PIXELS.read(file)?)?;

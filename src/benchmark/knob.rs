@@ -1,4 +1,5 @@
-//! Search for the setting of an arm's knob with which its picture ends at v\*.
+//! Search for the setting of an arm's knob with which its picture ends at v\*. What is rendered at a setting is left to
+//! the caller.
 
 use anyhow::Result;
 
@@ -9,8 +10,8 @@ const NEAR_ENOUGH: std::ops::Range<f64> = 0.89..1.12;
 /// Most that a knob is turned at once.
 const MOST_STEP: f64 = 10.0;
 
-/// Renders with ever better settings, and returns the render that came nearest to v\* by ratio. Knobs are like errors: what is left
-/// scales with them. `render` returns a render and its true v over v\*.
+/// Renders with ever better settings, and returns the render that came nearest to v\* by ratio. Knobs are like errors:
+/// what is left scales with them. `render` returns a render and its true v over v\*.
 ///
 /// # Errors
 /// Those of `render`.

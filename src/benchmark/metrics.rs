@@ -11,7 +11,7 @@ use flip_rs::{RgbImage, Weighting, ldr_flip};
 pub struct Metrics {
     /// Mean of LDR-FLIP.
     pub flip_mean: f64,
-    /// Its 99th percentile.
+    /// 99th percentile of LDR-FLIP.
     pub flip_p99: f64,
     /// ColorVideoVDP's just-objectionable differences, at most 10.
     pub jod: f64,
@@ -19,7 +19,8 @@ pub struct Metrics {
     pub relmse: f64,
 }
 
-/// Measures a picture as the display shows it against the reference shown there: linear RGB, 0..1, row-major, `width` pixels a row.
+/// Measures a picture as the display shows it against the reference shown there: linear RGB, 0..1, row-major, `width`
+/// pixels a row.
 ///
 /// # Errors
 /// Where the two are not of one size, or too small for a metric.

@@ -1,9 +1,9 @@
 //! What adaptive sampling saves: arms on the same tracer, judged against a reference and an oracle.
 //!
 //! [`run`] renders every arm of every scene with several seeds and writes `results.json`, `results.csv` and
-//! `report.html`. Truth is √2 × the local RMS (Gaussian of σ 0.25°) of the error through the eye's filters, in all three
-//! opponent channels, the reference's own noise taken out; it is never a pointwise difference and never what an arm itself
-//! predicts. Finished renders are kept in the output folder, so that a run that was broken off goes on.
+//! `report.html`. Truth is √2 × the local RMS (Gaussian of σ 0.25°) of the error through the eye's filters, in all
+//! three opponent channels, the reference's own noise taken out; it is never a pointwise difference and never what an
+//! arm itself predicts. Finished renders are kept in the output folder, so that a run that was broken off goes on.
 //!
 //! Not for timing the tracer: see `benches/`.
 
@@ -77,8 +77,8 @@ pub struct BenchSettings {
     pub output: PathBuf,
 }
 
-/// The share of the picture that has to be below v\* wherever a single one is asked for: where arms are searched and references end,
-/// and in tables, whose headings say it.
+/// The share of the picture that has to be below v\* wherever a single one is asked for: where arms are searched and
+/// references end, and in tables, whose headings say it.
 pub(crate) const MAIN_COVERAGE: f64 = 0.99;
 /// Shares of the picture that have to be below v\*.
 pub const COVERAGES: [f64; 3] = [0.95, MAIN_COVERAGE, 0.999];
@@ -97,7 +97,8 @@ fn tone_operator(scene: &Scene) -> Result<Box<dyn ToneOperator>> {
 
 /// One scene, ready to be rendered by any arm.
 pub(crate) struct Subject {
-    /// No other scene's of the same run: the file's name without its ending, with folders before it where others have that name.
+    /// No other scene's of the same run: the file's name without its ending, with folders before it where others have
+    /// that name.
     pub(crate) name: String,
     pub(crate) scene: Arc<Scene>,
     pub(crate) size: (u32, u32),
@@ -179,8 +180,9 @@ pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>
     Ok(bounds)
 }
 
-/// Loads every scene, and finds the display: what is missing or broken is told of before anything is written, and before hours are spent
-/// on what comes before it. [`animation()`] leaves this to its caller, who may call it once a denoiser.
+/// Loads every scene, and finds the display: what is missing or broken is told of before anything is written, and
+/// before hours are spent on what comes before it. [`animation()`] leaves this to its caller, who may call it once a
+/// denoiser.
 ///
 /// # Errors
 /// Scenes that do not load, or ask for a tone operator that there is not, and displays that there are not.

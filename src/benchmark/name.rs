@@ -3,8 +3,8 @@
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 
-/// A name for each scene: its file's, without the ending, and where others are called that too, its folder before it, as many folders
-/// as tell them apart. Files that differ by their ending alone keep it.
+/// A name for each scene: its file's, without the ending, and where others are called that too, its folder before it,
+/// as many folders as tell them apart. Files that differ by their ending alone keep it.
 ///
 /// # Errors
 /// If a scene is named twice, be it by two spellings of its path.

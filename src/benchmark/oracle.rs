@@ -35,8 +35,8 @@ pub(crate) fn displayed_variance(subject: &Subject, reference: &Reference, truth
     Ok(equivalent.map(|variance| variance * spp))
 }
 
-/// Fewest samples a pixel that the bound knows, of uniform sampling and of the optimum alike: no pixel does without any. A rule that has
-/// to look before it chooses has its pilot besides, which is its own affair.
+/// Fewest samples a pixel that the bound knows, of uniform sampling and of the optimum alike: no pixel does without
+/// any. A rule that has to look before it chooses has its pilot besides, which is its own affair.
 const FEWEST: f64 = 1.0;
 
 /// Samples a pixel that uniform sampling needs for v\* on this share of the picture; at least [`FEWEST`].
@@ -45,20 +45,21 @@ pub(crate) fn uniform_samples(subject: &Subject, truth: &Truth, variance: &Plane
     (hardest / subject.visibility).powi(2).max(FEWEST)
 }
 
-/// The samples that the oracle takes for a visibility on this share of the picture, in every pixel the pilot of our own loop at least:
-/// it is there to be compared with, and is traced as the loop traces.
+/// The samples that the oracle takes for a visibility on this share of the picture, in every pixel the pilot of our own
+/// loop at least: it is there to be compared with, and is traced as the loop traces.
 pub(crate) fn least_samples(truth: &Truth, variance: &Plane, visibility: f64, coverage: f64) -> Result<Plane> {
     Ok(optimum(truth, variance, visibility, coverage, f64::from(PILOT_SAMPLES_A_PIXEL))?.samples)
 }
 
-/// The fewest mean samples a pixel that any rule could take for a visibility on this share of the picture, with [`FEWEST`] in every
-/// pixel: what the optimum's multipliers prove, 0.2 to 4 % below its counts.
+/// The fewest mean samples a pixel that any rule could take for a visibility on this share of the picture, with
+/// [`FEWEST`] in every pixel: what the optimum's multipliers prove, 0.2 to 4 % below its counts.
 pub(crate) fn least_mean_samples(truth: &Truth, variance: &Plane, visibility: f64, coverage: f64) -> Result<f64> {
     let pixels = variance.values().len() as f64;
     Ok(optimum(truth, variance, visibility, coverage, FEWEST)?.lower_bound / pixels)
 }
 
-/// The cheapest counts of at least `fewest` a pixel: the pixels that uniform sampling would leave above the visibility are left above it.
+/// The cheapest counts of at least `fewest` a pixel: the pixels that uniform sampling would leave above the
+/// visibility are left above it.
 fn optimum(truth: &Truth, variance: &Plane, visibility: f64, coverage: f64, fewest: f64) -> Result<Allocation> {
     let seen = truth.thresholds.achromatic.predicted_visibility(variance);
     let hardest = seen.quantile(coverage) as f32;
@@ -76,7 +77,8 @@ fn optimum(truth: &Truth, variance: &Plane, visibility: f64, coverage: f64, fewe
     })?)
 }
 
-/// Traces real-valued counts: where one lies between two doublings, they are mixed by chance so that the mean of 1/n is right.
+/// Traces real-valued counts: where one lies between two doublings, they are mixed by chance so that the mean of 1/n is
+/// right.
 pub(crate) fn trace_counts(subject: &Subject, counts: &Plane, seed: u64) -> Film {
     let tracer = subject.tracer(seed);
     let mut film = Film::new(subject.size.0, subject.size.1);

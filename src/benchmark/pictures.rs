@@ -1,4 +1,5 @@
-//! What the report shows of a render: the picture, its counts, and what can truly be seen of its error.
+//! What the report shows of a render: the picture, its counts, and what can truly be seen of its error. How they stand
+//! on a page is left to `report`.
 
 use super::Subject;
 use crate::film::Film;

@@ -1,4 +1,4 @@
-//! Curves of the report, as SVG.
+//! Curves of the report, as SVG. Their points are taken as they are given.
 
 use super::arm::Arm;
 use super::curve::{Curve, CurvePoint};
@@ -86,7 +86,7 @@ fn in_short(value: f64) -> String {
     }
 }
 
-/// Every metric over samples and over time, with a line at v\*, `target`.
+/// Plots of every metric over samples and over time, with a line at v\*, `target`.
 pub(super) fn plots(curves: &[&Curve], target: f64) -> String {
     let metrics = [(VISIBILITY, Some(target)), (FLIP, None), (JOD, None), (RELMSE, None)];
     let row = |x: Axis| metrics.iter().filter_map(|&(y, mark)| plot(curves, x, y, mark)).collect::<String>();

@@ -1,4 +1,4 @@
-//! Names that others gave, inside CSV and HTML.
+//! Quotes names that others gave, for CSV and HTML.
 
 use std::borrow::Cow;
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(into = "&'static str")]
 pub enum RaceRule {
-    /// The same everywhere: what others are compared with.
+    /// Uniform: the same count everywhere, which others are compared with.
     Uniform,
     /// Cycles' rule.
     Relative,
@@ -39,14 +39,14 @@ impl From<RaceRule> for &'static str {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(into = "String")]
 pub enum Quality {
-    /// At least so much by ColorVideoVDP.
+    /// Quality of at least so much by ColorVideoVDP, JOD.
     Jod(f64),
-    /// At most the FLIP that uniform sampling first has from so many samples a pixel on.
+    /// Quality of at most the FLIP that uniform sampling first has from so many samples a pixel on.
     FlipOfUniformAt(f64),
 }
 
 impl Quality {
-    /// In the order of files and tables.
+    /// The qualities in the order of files and tables.
     pub const ALL: [Self; 3] = [Self::Jod(9.8), Self::Jod(9.9), Self::FlipOfUniformAt(64.0)];
 
     /// What files and tables call it.
@@ -90,7 +90,7 @@ pub struct RacePoint {
 }
 
 impl RacePoint {
-    /// Of several seeds with one budget.
+    /// Mean of several seeds with one budget.
     pub(super) fn mean(laps: &[Self]) -> Self {
         let mean = |of: fn(&Self) -> f64| laps.iter().map(of).sum::<f64>() / laps.len() as f64;
         Self {
@@ -123,7 +123,7 @@ pub struct Race {
     pub denoiser: String,
     /// Rule.
     pub rule: RaceRule,
-    /// One a budget, ascending.
+    /// Points, one a budget, ascending.
     pub points: Vec<RacePoint>,
     /// What it needs for each of [`Quality::ALL`].
     pub needs: Vec<Need>,
@@ -132,7 +132,7 @@ pub struct Race {
 /// What a rule needs for a quality.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Need {
-    /// For what.
+    /// The quality that is needed.
     pub quality: Quality,
     /// Mean samples a pixel.
     pub samples: Reached,
@@ -145,7 +145,7 @@ pub struct Need {
 pub struct RaceMean {
     /// The rule.
     pub rule: RaceRule,
-    /// For what.
+    /// The quality that is needed.
     pub quality: Quality,
     /// The mean; `None` where no pair has a ratio.
     pub uniform_over: Option<f64>,

@@ -1,9 +1,10 @@
-//! Samples at which a curve has a quality, as far as its points tell.
+//! Samples at which a curve has a quality, as far as its points tell. Beyond them it gives a bound, never a guess.
 
 use serde::Serialize;
 use std::fmt;
 
-/// Mean samples a pixel at which a curve has a quality. JSON is `{"about": 41.2}`, `{"at_most": 32.0}` or `{"more_than": 256.0}`.
+/// Mean samples a pixel at which a curve has a quality. JSON is `{"about": 41.2}`, `{"at_most": 32.0}` or
+/// `{"more_than": 256.0}`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reached {
@@ -16,7 +17,8 @@ pub enum Reached {
 }
 
 impl Reached {
-    /// Where a curve of (samples, quality) first reaches a quality, straight between points in the logarithm of samples.
+    /// Where a curve of (samples, quality) first reaches a quality, straight between points in the logarithm of
+    /// samples.
     pub(super) fn by(curve: &[(f64, f64)], quality: f64) -> Self {
         let Some(index) = curve.iter().position(|point| point.1 >= quality) else {
             return Self::MoreThan(curve.last().map_or(0.0, |point| point.0));

@@ -1,4 +1,5 @@
-//! What the benchmark found: one record a scene, arm, seed and coverage, and the summary over scenes.
+//! What the benchmark found: one record a scene, arm, seed and coverage, and the summary over scenes. Plain values:
+//! they are measured and averaged elsewhere.
 
 use super::arm::Arm;
 use super::curve::Curve;
@@ -36,10 +37,10 @@ pub struct Record {
     pub seconds: f64,
     /// True v at this coverage over v\* in the render itself.
     pub reached: f64,
-    /// Uniform sampling's need over this arm's; `None`, as in the next two, where there is nobody to compare with, or one of the
-    /// two needs nothing since nothing of its error can be seen.
+    /// Uniform sampling's need over this arm's; `None`, as in the next two, where there is nobody to compare with, or
+    /// one of the two needs nothing since nothing of its error can be seen.
     pub speedup_samples: Option<f64>,
-    /// The same in seconds.
+    /// Uniform sampling's need in seconds over this arm's; `None` for the reasons of [`Self::speedup_samples`].
     pub speedup_seconds: Option<f64>,
     /// The oracle's samples over this arm's.
     pub efficiency: Option<f64>,
@@ -51,11 +52,12 @@ pub struct Record {
     pub overshoot_fraction: f64,
     /// Share of the time that is not tracing.
     pub overhead: f64,
-    /// Of that, the look at the finished picture, which its report takes whoever chose the samples.
+    /// Share of the time that goes to the look at the finished picture, which is part of [`Self::overhead`] and which
+    /// its report takes whoever chose the samples.
     pub last_look: f64,
     /// Mean LDR-FLIP to the reference.
     pub flip_mean: f64,
-    /// Its 99th percentile.
+    /// 99th percentile of LDR-FLIP to the reference.
     pub flip_p99: f64,
     /// ColorVideoVDP.
     pub jod: f64,
@@ -71,7 +73,7 @@ impl Record {
     }
 }
 
-/// Everything over all scenes at one coverage for one arm.
+/// One arm at one coverage over all scenes.
 #[derive(Clone, Debug, Serialize)]
 pub struct ArmSummary {
     /// Arm.
@@ -80,7 +82,7 @@ pub struct ArmSummary {
     pub coverage: f64,
     /// Uniform's samples over the arm's; `None`, as in the next two, where no scene has such a ratio.
     pub speedup_samples: Option<GeometricMean>,
-    /// The same in seconds.
+    /// Uniform's seconds over the arm's; `None` where no scene has such a ratio.
     pub speedup_seconds: Option<GeometricMean>,
     /// Oracle's samples over the arm's.
     pub efficiency: Option<GeometricMean>,
@@ -93,11 +95,12 @@ pub struct ReferenceOf {
     pub scene: String,
     /// Samples a pixel of its reference.
     pub spp: u32,
-    /// Samples a pixel that uniform sampling was found to need for v\* on 99 %, of which `reference_factor` is a multiple.
+    /// Samples a pixel that uniform sampling was found to need for v\* on 99 %, of which `reference_factor` is a
+    /// multiple.
     pub uniform_spp: f64,
 }
 
-/// All results.
+/// The results of a run over scenes and arms.
 #[derive(Clone, Debug, Serialize)]
 pub struct Results {
     /// Version of this file's layout.
@@ -120,9 +123,9 @@ pub struct Results {
     pub references: Vec<ReferenceOf>,
     /// Level of the intervals of `summary`.
     pub interval_level: f64,
-    /// One a scene, arm, seed and coverage.
+    /// Records, one a scene, arm, seed and coverage.
     pub records: Vec<Record>,
-    /// Over scenes.
+    /// Summaries over scenes.
     pub summary: Vec<ArmSummary>,
     /// How pictures come to be good, one a scene and arm.
     pub curves: Vec<Curve>,
@@ -171,7 +174,8 @@ impl Results {
         let target = self.visibility * self.visibility;
         let pixels = f64::from(self.size.0) * f64::from(self.size.1);
         let mean = |of: fn(&Run) -> f64| runs.iter().map(of).sum::<f64>() / runs.len() as f64;
-        // A seed whose render took few samples shows more error and needs no more for it: v² counts by what its render took.
+        // A seed whose render took few samples shows more error and needs no more for it: v² counts by what its render
+        // took.
         let (Some(energy), Some(by_samples), Some(by_seconds)) = (
             mean_energy(runs, |_| 1.0),
             mean_energy(runs, |run| run.samples as f64 / pixels),

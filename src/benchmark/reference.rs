@@ -68,7 +68,8 @@ impl Reference {
             let reached = judge(&film, &settings, 1.0)?.predicted.quantile(MAIN_COVERAGE) / subject.visibility;
             let needed = f64::from(spp) * reached * reached;
             if needed <= f64::from(spp) || f64::from(spp) >= MOST_SAMPLES {
-                // A picture without noise needs none; no render takes fewer than one. As it is kept: a run that goes on has the same.
+                // A picture without noise needs none; no render takes fewer than one. As it is kept: a run
+                // that goes on has the same.
                 break f64::from(needed.max(1.0) as f32);
             }
             spp *= 2;
@@ -189,8 +190,8 @@ impl Subject {
     }
 }
 
-/// Hash of the running program: what it renders and measures depends on all of its code, whose version stays the same while it
-/// changes. Its version, where its file cannot be read. Takes 0.1 s once, for 160 MB with debug information.
+/// Hash of the running program: what it renders and measures depends on all of its code, whose version stays the same
+/// while it changes. Its version, where its file cannot be read. Takes 0.1 s once, for 160 MB with debug information.
 fn program() -> &'static str {
     static PROGRAM: OnceLock<String> = OnceLock::new();
     PROGRAM.get_or_init(|| {

@@ -1,4 +1,4 @@
-//! `report.html`: one file that needs nothing else.
+//! Writes `report.html`: one file that needs nothing else.
 
 use super::arm::Arm;
 use super::curve::Curve;

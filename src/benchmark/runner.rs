@@ -1,4 +1,5 @@
-//! Rendering an arm, judging it, and keeping what was found.
+//! Renders an arm, judges it, and keeps what was found, so that no render is made twice. Means over scenes are left to
+//! `summary`.
 
 use super::arm::Arm;
 use super::curve::{Curve, course};
@@ -37,9 +38,10 @@ pub(crate) struct Run {
     pub(crate) seconds: f64,
     /// Time in perception, planning and audits.
     pub(crate) seconds_perception: f64,
-    /// Of that, the look at the finished picture, which its report takes whoever chose the samples.
+    /// Seconds of the look at the finished picture, part of [`Self::seconds_perception`], which its report takes
+    /// whoever chose the samples.
     pub(crate) seconds_last_look: f64,
-    /// `None` where the reference is black.
+    /// Energy bias against the reference; `None` where that is black.
     pub(crate) energy_bias: Option<EnergyBias>,
     pub(crate) flip_mean: f64,
     pub(crate) flip_p99: f64,
@@ -136,8 +138,8 @@ impl<'a> ArmRunner<'a> {
         Ok(runs)
     }
 
-    /// The run of the first seed, its pictures written for the report. An arm with a knob is rendered up to four times for 99 %
-    /// of the picture at v\*.
+    /// The run of the first seed, its pictures written for the report. An arm with a knob is rendered up to four times
+    /// for 99 % of the picture at v\*.
     fn first_run(&mut self, arm: Arm) -> Result<Run> {
         let uniform_spp = match arm {
             Arm::Uniform => uniform_samples(self.subject, self.truth, &self.variance()?.clone(), MAIN_COVERAGE),

@@ -6,11 +6,12 @@ use serde::Serialize;
 /// Level of every interval of a [`GeometricMean`].
 pub const INTERVAL_LEVEL: f64 = 0.95;
 
-/// A geometric mean over scenes with the interval that the scatter between seeds leaves it, of the level [`INTERVAL_LEVEL`].
+/// A geometric mean over scenes with the interval that the scatter between seeds leaves it, of the level
+/// [`INTERVAL_LEVEL`].
 ///
-/// The interval is Student's t on the logarithms: seeds within scenes are what is drawn. Scenes are not (another choice of scenes has
-/// another mean), nor is the reference, whose error all seeds share. Percentiles of a bootstrap, as until 27 November 2026, are too
-/// narrow with 2 to 5 seeds: they cover 49 to 90 % where 95 are claimed.
+/// The interval is Student's t on the logarithms: seeds within scenes are what is drawn. Scenes are not (another choice
+/// of scenes has another mean), nor is the reference, whose error all seeds share. Percentiles of a bootstrap, as until
+/// 27 November 2026, are too narrow with 2 to 5 seeds: they cover 49 to 90 % where 95 are claimed.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct GeometricMean {
     /// The mean.
@@ -47,8 +48,8 @@ pub fn mean_ratio(ratios: impl IntoIterator<Item = f64>) -> Option<f64> {
     (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
 }
 
-/// Geometric mean of ratios: each scene's is `ratios[scene]` by seed, and `pooled[scene]` for all its seeds together, which is
-/// what the mean is taken of.
+/// Geometric mean of ratios: each scene's is `ratios[scene]` by seed, and `pooled[scene]` for all its seeds together,
+/// which is what the mean is taken of.
 pub(crate) fn geometric_mean(pooled: &[f64], ratios: &[Vec<f64>]) -> GeometricMean {
     let value = mean_ratio(pooled.iter().copied()).unwrap_or(1.0);
     let least = pooled.iter().copied().fold(f64::INFINITY, f64::min);
@@ -58,8 +59,8 @@ pub(crate) fn geometric_mean(pooled: &[f64], ratios: &[Vec<f64>]) -> GeometricMe
 
 /// Half width of the interval of the mean logarithm over scenes; `None` where a scene has fewer than two seeds.
 ///
-/// Each scene's mean has the variance s²/n of its own seeds. Their sum's degrees of freedom are Satterthwaite's (1946), which err to
-/// the wide side: intervals of three to five seeds cover 94.5 to 97 %, of two 95 to 98.
+/// Each scene's mean has the variance s²/n of its own seeds. Their sum's degrees of freedom are Satterthwaite's (1946),
+/// which err to the wide side: intervals of three to five seeds cover 94.5 to 97 %, of two 95 to 98.
 fn half_width_of_log(ratios: &[Vec<f64>]) -> Option<f64> {
     let of_means = ratios.iter().map(|seeds| variance_of_mean_log(seeds)).collect::<Option<Vec<f64>>>()?;
     let variance: f64 = of_means.iter().sum();
@@ -113,7 +114,8 @@ mod tests {
         (-2.0 * uniform(0).ln()).sqrt() * (std::f64::consts::TAU * uniform(1)).cos()
     }
 
-    /// Share of 4000 benches with these scatters of scenes, in logarithms, and so many seeds whose interval holds the truth, 1.
+    /// Share of 4000 benches with these scatters of scenes, in logarithms, and so many seeds whose interval holds the
+    /// truth, 1.
     fn coverage(scatters: &[f64], seeds: usize) -> f64 {
         const BENCHES: u64 = 4000;
         let holds = |bench: &u64| {
@@ -130,7 +132,7 @@ mod tests {
         (0..BENCHES).filter(holds).count() as f64 / BENCHES as f64
     }
 
-    /// Standard error of a coverage here: 0.3 %. The bootstrap's percentiles had 49 to 90 %.
+    /// Standard error of a coverage here: 0.3 %. Regression: the bootstrap's percentiles held it in 49 to 90 %.
     #[test]
     fn intervals_hold_the_truth_as_often_as_they_say() {
         const ALIKE: [f64; 9] = [0.1; 9];
@@ -148,7 +150,8 @@ mod tests {
             let found = coverage(scatters, seeds);
             assert!((0.93..=0.97).contains(&found), "{} scenes, {seeds} seeds: {found}", scatters.len());
         }
-        // Two seeds tell so little of how many degrees of freedom there are that Satterthwaite's intervals are a fifth too wide.
+        // Two seeds tell so little of how many degrees of freedom there are that Satterthwaite's intervals are a fifth
+        // too wide.
         let found = coverage(&ALIKE, 2);
         assert!((0.93..=0.985).contains(&found), "nine scenes, two seeds: {found}");
     }

@@ -1,4 +1,4 @@
-//! `results.csv`.
+//! Writes `results.csv`: a line for each record.
 
 use super::quote::csv_field;
 use super::record::Record;

@@ -1,4 +1,5 @@
-//! What can truly be seen of a render's error.
+//! Measures what can truly be seen of a render's error, against a reference. Not what a render knows of
+//! itself: that is its judgement.
 
 use super::Subject;
 use super::metrics::{Metrics, measure};
@@ -55,8 +56,9 @@ impl Truth {
         measure(&self.display, self.width, &self.picture, picture)
     }
 
-    /// v² of a displayed picture's error, without the reference's part in the difference: the channel that shows most. As of noise, which goes
-    /// on beyond the border: an error that is the same all over the picture is not in it, but in the bias of its energy.
+    /// v² of a displayed picture's error, without the reference's part in the difference: the channel that shows most.
+    /// As of noise, which goes on beyond the border: an error that is the same all over the picture is not in it, but
+    /// in the bias of its energy.
     pub(crate) fn squared_visibility(&self, picture: &[[f32; 3]]) -> Plane {
         let shown = signals(&displayed_rgb(&self.display, picture), self.width, self.height);
         let mut most = Plane::filled(self.width, self.height, 0.0);
@@ -71,9 +73,10 @@ impl Truth {
     }
 }
 
-/// v² of a difference to a reference without the reference's own part; 0 where so little of it is left that the reference cannot tell, or nobody: a
-/// hundredth of that part, or the filters' rounding, from which v is some 1e-6. A lamp of one pixel needed 7e-12 samples by one seed and 1000 by another, and
-/// intervals went up to 8e44.
+/// v² of a difference to a reference without the reference's own part; 0 where so little of it is left that the
+/// reference cannot tell, or nobody: a hundredth of that part, or the filters' rounding, from which v is some 1e-6.
+/// Measured without: a lamp of one pixel needs 7e-12 samples by one seed and 1000 by another, and intervals go up to
+/// 8e44.
 fn beyond_own(energy: f32, own: f32) -> f32 {
     const LEAST_SHARE: f32 = 0.01;
     const LEAST: f32 = 1e-8;

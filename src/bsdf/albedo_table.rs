@@ -19,8 +19,9 @@ const AVERAGE_NODES: usize = 4 * (ROUGHNESS_NODES - 1) + 1;
 #[derive(Clone)]
 pub(crate) struct AlbedoTable {
     rows: [[f32; COSINE_NODES]; ROUGHNESS_NODES],
-    /// 2∫ of the curve at each of more closely spaced roughnesses times μ dμ, over roughness⁴ = α². The average falls like α² towards smooth
-    /// surfaces, where linear interpolation of the average itself would be wrong by a tenth; of the ratio it is not.
+    /// 2∫ of the curve at each of more closely spaced roughnesses times μ dμ, over roughness⁴ = α². The average
+    /// falls like α² towards smooth surfaces, where linear interpolation of the average itself would be wrong by a
+    /// tenth; of the ratio it is not.
     averages_over_alpha2: [f32; AVERAGE_NODES],
 }
 
@@ -62,8 +63,8 @@ static QUADRATURE: LazyLock<[Point; POINTS]> = LazyLock::new(|| {
 /// Where the columns lie: t = (√(μ(1 + α)/(μ + α)) + μ)/2.
 ///
 /// Masking depends on μ/α at grazing angles: the root follows the dip of E there at every roughness, down to its steep
-/// start at μ = 0, where equal steps of μ would miss it when the surface is nearly smooth. The other half of the columns
-/// is equally spaced, for what depends on μ alone, such as total internal reflection.
+/// start at μ = 0, where equal steps of μ would miss it when the surface is nearly smooth. The other half of the
+/// columns is equally spaced, for what depends on μ alone, such as total internal reflection.
 pub(super) fn column_of_cosine(mu: f32, alpha: f32) -> f32 {
     0.5 * ((mu * (1.0 + alpha) / (mu + alpha)).sqrt() + mu)
 }
@@ -140,8 +141,8 @@ pub(crate) struct DirectionalCurve<'a> {
 }
 
 impl AlbedoTable {
-    /// The table for such facets. Where they are anisotropic and no table of their own is given, their mean width counts,
-    /// which is wrong by a tenth at widths of 4 to 1.
+    /// The table for such facets. Where they are anisotropic and no table of their own is given, their mean width
+    /// counts, which is wrong by a tenth at widths of 4 to 1.
     pub(crate) fn along<'a>(
         &'a self,
         facets: &Microfacets,
@@ -223,7 +224,7 @@ impl PairTable {
 }
 
 impl PairCurve<'_> {
-    /// Both values at an incident cosine in (0, 1].
+    /// Values of both tables at an incident cosine in (0, 1].
     pub(crate) fn at(&self, mu: f32) -> [f32; 2] {
         let t = column_of_cosine(mu.max(f32::MIN_POSITIVE), self.alpha);
         let TablePlace { node: column, fraction } = position(t, COSINE_NODES);
@@ -234,7 +235,7 @@ impl PairCurve<'_> {
         })
     }
 
-    /// Twice the integrals of the curves times μ dμ.
+    /// Averages of both curves over the hemisphere: twice their integrals times μ dμ.
     pub(crate) fn averages(&self) -> [f32; 2] {
         self.averages
     }
@@ -297,7 +298,7 @@ pub(super) struct TablePlace {
 }
 
 impl TablePlace {
-    /// Of `x` in [0, 1] among so many nodes, two at least.
+    /// The place of `x` in [0, 1] among so many nodes, two at least.
     #[inline]
     pub(super) fn of(x: f32, nodes: usize) -> Self {
         let scaled = x * (nodes - 1) as f32;
@@ -312,7 +313,7 @@ impl TablePlace {
     }
 }
 
-/// Of `x`, which may lie outside of [0, 1].
+/// The place of `x`, which may lie outside of [0, 1], among so many nodes.
 #[inline]
 fn position(x: f32, nodes: usize) -> TablePlace {
     TablePlace::of(x.clamp(0.0, 1.0), nodes)

@@ -46,7 +46,7 @@ pub(super) struct NodesBeside {
 }
 
 impl NodesBeside {
-    /// Among as many as [`WidthRange::nodes`] made.
+    /// The nodes beside a width in [0, 1], among as many as [`WidthRange::nodes`] made.
     pub(super) fn of(alpha: f32, nodes: usize) -> Self {
         if nodes == 1 {
             return Self { low: 0, high: 0, fraction: 0.0 };
@@ -58,8 +58,8 @@ impl NodesBeside {
 
 /// The azimuths of a table's rows, from x to y: equally spaced in w/(1 + w), where w = |y|√α_y/(|x|√α_x).
 ///
-/// That lies between equal steps of azimuth and those after stretching by the widths. What is seen along the narrow axis changes
-/// within an azimuth of α_x/α_y: with steps of the first kind a coat of 0.01 by 1 gave back 1.04 there.
+/// That lies between equal steps of azimuth and those after stretching by the widths. What is seen along the narrow
+/// axis changes within an azimuth of α_x/α_y: with steps of the first kind a coat of 0.01 by 1 gives back 1.04 there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Azimuths {
     /// √α along x and y.
@@ -67,7 +67,7 @@ pub(super) struct Azimuths {
 }
 
 impl Azimuths {
-    /// For slope widths above 0.
+    /// The azimuths of rows for slope widths above 0 along x and y.
     pub(super) fn new(alphas: [f32; 2]) -> Self {
         Self { roots: alphas.map(f32::sqrt) }
     }

@@ -2,9 +2,10 @@
 //!
 //! Everything here is for slopes of width 1; [`super::microfacets`] stretches directions accordingly.
 //!
-//! Sources: B. Smith (1967) for Λ, here in closed form and not by the usual rational fit, whose error of 0.35 % would show
-//! in tests of the pdf; E. Heitz & E. d'Eon, *Importance sampling microfacet-based BSDFs using the distribution of visible
-//! normals* (2014), for the decomposition into two slopes; M. Giles, *Approximating the erfinv function* (2010).
+//! Sources: B. Smith (1967) for Λ, here in closed form and not by the usual rational fit, whose error of
+//! 0.35 % would show in tests of the pdf; E. Heitz & E. d'Eon, *Importance sampling microfacet-based BSDFs
+//! using the distribution of visible normals* (2014), for the decomposition into two slopes; M. Giles,
+//! *Approximating the erfinv function* (2010).
 
 use glam::Vec3;
 use libm::{erf, erff};
@@ -30,11 +31,11 @@ pub(super) fn visible_normal(view: Vec3, u: [f32; 2]) -> Vec3 {
     Vec3::new(cos_phi * towards - sin_phi * across, sin_phi * towards + cos_phi * across, 1.0)
 }
 
-/// Solves ∫ (cos θ + s sin θ)⁺ exp(−s²) ds = u·(whole) for the upper limit, s being how far the normal leans towards the
-/// viewer.
+/// Solves ∫ (cos θ + s sin θ)⁺ exp(−s²) ds = u·(whole) for the upper limit, s being how far the normal leans towards
+/// the viewer.
 ///
-/// The integral's closed form is increasing, so Newton's method held in a shrinking bracket always ends; in f64, because
-/// f32 leaves too few bits of the tail at grazing angles.
+/// The integral's closed form is increasing, so Newton's method held in a shrinking bracket always ends; in f64,
+/// because f32 leaves too few bits of the tail at grazing angles.
 fn slope_towards_viewer(sin: f64, cos: f64, u: f64) -> f32 {
     const TAIL: f64 = 6.0;
     const ROOT_PI: f64 = 1.772_453_850_905_516;

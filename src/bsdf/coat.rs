@@ -1,11 +1,12 @@
 //! How much light a clear coat lets through to what lies beneath, and the tables for it.
 //!
-//! E(ω) is the share that the coat's outer face reflects at one facet; everything else, 1 − E(ω), enters. A base of
-//! separable, diffuse-like scattering then gets (1 − E(ωo))(1 − E(ωi))/(π(1 − E_avg)) times its colour, which is reciprocal
-//! and, for a white base, lossless: all light that the coat turns back inside is scattered again until it leaves.
+//! E(ω) is the share that the coat's outer face reflects at one facet; everything else, 1 − E(ω), enters. A
+//! base of separable, diffuse-like scattering then gets (1 − E(ωo))(1 − E(ωi))/(π(1 − E_avg)) times its
+//! colour, which is reciprocal and, for a white base, lossless: all light that the coat turns back inside is
+//! scattered again until it leaves.
 //!
-//! Source: C. Kelemen & L. Szirmay-Kalos, *A microfacet based coupled specular-matte BRDF model with importance sampling*
-//! (2001), eq. 5. The tables are computed here, by quadrature over visible normals.
+//! Source: C. Kelemen & L. Szirmay-Kalos, *A microfacet based coupled specular-matte BRDF model with importance
+//! sampling* (2001), eq. 5. The tables are computed here, by quadrature over visible normals.
 
 use super::albedo_table::{AlbedoTable, DirectionalCurve, average_over_visible_normals, direction_at};
 use super::anisotropic_table::{AnisotropicTable, WidthRange};
@@ -88,7 +89,7 @@ fn above_smooth_at(facets: &Microfacets, wo: Vec3, eta: f32) -> f32 {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coat<'a> {
     pub(crate) eta: f32,
-    /// None if perfectly smooth.
+    /// Facets of the coat; `None` if it is perfectly smooth.
     pub(crate) facets: Option<Microfacets>,
     above_smooth: Option<DirectionalCurve<'a>>,
     average: f32,

@@ -1,13 +1,13 @@
 //! Lacquered or anodised metal: a clear dielectric coat over a conductor, either of them smooth or rough.
 //!
-//! Parameters: `eta` and `k`, the metal's index of refraction per linear RGB channel relative to air; its facets and the
-//! coat's; tables for the coat's index of refraction (at least 1) and for both roughnesses.
+//! Parameters: `eta` and `k`, the metal's index of refraction per linear RGB channel relative to air; its facets and
+//! the coat's; tables for the coat's index of refraction (at least 1) and for both roughnesses.
 //!
-//! Light is reflected by the coat's face, or refracted into the coat, reflected once by the metal and refracted out again
-//! (a rough coat widens the metal's facets by half the variance that its slopes give to refracted rays, twice), or meets
-//! the metal twice or more often. Tables say how much of it each of these is, by light that goes to and fro between the
-//! layers; two diffuse-like lobes give back what meets the metal twice, and what meets it more often: reciprocal, and
-//! lossless over a lossless metal. With both smooth the series of reflections is summed exactly.
+//! Light is reflected by the coat's face, or refracted into the coat, reflected once by the metal and refracted out
+//! again (a rough coat widens the metal's facets by half the variance that its slopes give to refracted rays, twice),
+//! or meets the metal twice or more often. Tables say how much of it each of these is, by light that goes to and fro
+//! between the layers; two diffuse-like lobes give back what meets the metal twice, and what meets it more often:
+//! reciprocal, and lossless over a lossless metal. With both smooth the series of reflections is summed exactly.
 //!
 //! Sources: own combination of the half-way vectors of B. Walter et al. (2007), the compensation of C. Kulla & A. Conty
 //! (2017) and the series of plane layers, F + T²R/(1 − FR). Not for tinted or thick coats.

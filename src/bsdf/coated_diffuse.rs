@@ -25,9 +25,10 @@ pub struct CoatedDiffuse<'a> {
 /// What light that the coat turns back inside does to the base's colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Saturation {
-    /// It meets the base again and takes on more of its colour, as it does in reality.
+    /// Light meets the base again and takes on more of its colour, as it does in reality.
     Repeated,
-    /// Nothing: albedo is `reflectance` times what the coat lets in, as in simpler models that scenes of others may expect.
+    /// Nothing: albedo is `reflectance` times what the coat lets in, as in simpler models that scenes of others may
+    /// expect.
     None,
 }
 

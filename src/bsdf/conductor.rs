@@ -1,11 +1,12 @@
 //! Metal: a boundary that reflects or absorbs, smooth or rough.
 //!
-//! Parameters: `eta` and `k`, real and imaginary part of the index of refraction per linear RGB channel, relative to air
-//! (η of 0 with any k reflects everything); `tint` in [0, 1], white for real metals; microfacets of GGX or Beckmann, of
-//! which slope widths below 1e-3 are a perfect mirror with the metal's Fresnel reflectance.
+//! Parameters: `eta` and `k`, real and imaginary part of the index of refraction per linear RGB channel, relative to
+//! air (η of 0 with any k reflects everything); `tint` in [0, 1], white for real metals; microfacets of GGX or
+//! Beckmann, of which slope widths below 1e-3 are a perfect mirror with the metal's Fresnel reflectance.
 //!
 //! Sources: R. Cook & K. Torrance (1982) for the model, B. Walter et al. (2007), eq. 20; the GGX distribution and the
-//! compensation of multiple bounces as their own files say. Not for painted or anodised metal: those are coated diffuse.
+//! compensation of multiple bounces as their own files say. Not for painted or anodised metal: those are coated
+//! diffuse.
 
 use super::albedo_table::DirectionalCurve;
 use super::anisotropic_table::AnisotropicTable;

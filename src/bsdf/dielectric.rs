@@ -55,8 +55,8 @@ struct Near<'a> {
 }
 
 impl<'a> Dielectric<'a> {
-    /// Index inside over outside, the surface's facets, tint of each crossing in [0, 1], and the tables of the same index
-    /// and distribution.
+    /// Index inside over outside, the surface's facets, tint of each crossing in [0, 1], and the tables of the
+    /// same index and distribution.
     pub fn new(
         eta_inside_over_outside: f32,
         microfacets: Microfacets,

@@ -1,7 +1,8 @@
 //! Tables of the light that one facet of a rough dielectric boundary keeps, for both sides of the boundary.
 //!
-//! Source: C. Kulla & A. Conty, *Revisiting physically based shading at Imageworks* (SIGGRAPH course 2017), for the split
-//! of what is missing between reflection and transmission. The tables are computed here, by quadrature over visible normals.
+//! Source: C. Kulla & A. Conty, *Revisiting physically based shading at Imageworks* (SIGGRAPH course 2017), for
+//! the split of what is missing between reflection and transmission. The tables are computed here, by
+//! quadrature over visible normals.
 
 use super::albedo_table::{AlbedoTable, DirectionalCurve, average_over_visible_normals, direction_at};
 use super::anisotropic_table::{AnisotropicTable, WidthRange};
@@ -27,7 +28,7 @@ pub struct DielectricTables {
     distribution: Distribution,
     /// 1 − E of reflection and transmission together, by energy, for light that arrives from outside.
     outside: AlbedoTable,
-    /// The same for light that arrives from inside.
+    /// The table for light that arrives from inside.
     inside: AlbedoTable,
     anisotropic: Option<Box<AnisotropicSides>>,
     /// Average transmittance of a smooth boundary times the squared index of the side that light comes from: the same
@@ -47,7 +48,7 @@ struct AnisotropicSides {
 pub(crate) struct DielectricCompensation<'a> {
     /// Energy that single scattering loses on the path's side.
     pub(crate) near: DirectionalCurve<'a>,
-    /// The same on the other side.
+    /// Energy that single scattering loses on the other side.
     pub(crate) far: DirectionalCurve<'a>,
     /// Share of the missing energy that is transmitted; the rest is reflected.
     pub(crate) transmitted_share: f32,
@@ -93,9 +94,9 @@ impl DielectricTables {
 
     /// The compensation of a boundary of such `facets` for a path on one side of it.
     ///
-    /// Reciprocity asks that b·(1 − E_avg)·η² be the same for both sides, b being the transmitted share. Kulla and Conty
-    /// leave one number free; it is set so that b is the smooth boundary's average transmittance on the side that loses
-    /// less, which keeps b in [0, 1] on both.
+    /// Reciprocity asks that b·(1 − E_avg)·η² be the same for both sides, b being the transmitted share. Kulla and
+    /// Conty leave one number free; it is set so that b is the smooth boundary's average transmittance on the side that
+    /// loses less, which keeps b in [0, 1] on both.
     pub(crate) fn compensation(&self, facets: &Microfacets, side: Side) -> DielectricCompensation<'_> {
         let outer = self.outside.along(facets, self.anisotropic.as_ref().map(|sides| &sides.outside));
         let inner = self.inside.along(facets, self.anisotropic.as_ref().map(|sides| &sides.inside));
@@ -124,7 +125,8 @@ pub(super) fn dielectric_average(eta: f32) -> f32 {
     sum / STEPS as f32
 }
 
-/// Energy that one event at a facet loses, of light that comes from `wo`; `eta` is the far side's index over this one's.
+/// Energy that one event at a facet loses, of light that comes from `wo`; `eta` is the far side's index over this
+/// one's.
 fn missing(facets: &Microfacets, wo: Vec3, eta: f32) -> f32 {
     average_over_visible_normals(facets, wo, |m| {
         let boundary = fresnel::dielectric(wo.dot(m).max(0.0), eta);

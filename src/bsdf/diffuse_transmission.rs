@@ -1,11 +1,11 @@
 //! A thin diffuse sheet (paper, a leaf, a lampshade): light is scattered evenly on both sides.
 //!
-//! Parameters: `reflectance` and `transmittance`, albedo of the lit side and of the other per linear RGB channel, each in
-//! [0, 1]; their sum should not exceed 1 in any channel, or the sheet would make light.
+//! Parameters: `reflectance` and `transmittance`, albedo of the lit side and of the other per linear RGB channel, each
+//! in [0, 1]; their sum should not exceed 1 in any channel, or the sheet would make light.
 //!
-//! Source: Pharr, Jakob & Humphreys, *Physically Based Rendering* (2023), section 9.2 on diffuse transmission; f = ρ/π and
-//! τ/π. Both sides lie in the same medium, so no factor for the index of refraction arises. Not for volumes whose
-//! thickness shows.
+//! Source: Pharr, Jakob & Humphreys, *Physically Based Rendering* (2023), section 9.2 on diffuse transmission;
+//! f = ρ/π and τ/π. Both sides lie in the same medium, so no factor for the index of refraction arises. Not for
+//! volumes whose thickness shows.
 
 use super::{BsdfEvaluation, BsdfSample, to_front, turn, warp};
 use glam::Vec3;

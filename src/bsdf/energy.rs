@@ -1,14 +1,14 @@
 //! Tables of the light that single scattering off microfacets keeps, and what is needed to give the rest back.
 //!
 //! A microfacet model follows light to its first facet only; what the shadowing term removes has in truth gone on to
-//! another facet. Kulla & Conty add a diffuse-like lobe of exactly the missing energy,
-//! (1 − E(μo))(1 − E(μi)) / (π(1 − E_avg)), where E(μ) is the directional albedo of single scattering at incident cosine
-//! μ and E_avg = 2∫E(μ)μ dμ: reciprocal by its symmetry and lossless by its norm, whatever the interpolation error of
-//! the table at μi.
+//! another facet. Kulla & Conty add a diffuse-like lobe of exactly the missing energy, (1 − E(μo))(1 − E(μi)) /
+//! (π(1 − E_avg)), where E(μ) is the directional albedo of single scattering at incident cosine μ and E_avg = 2∫E(μ)μ
+//! dμ: reciprocal by its symmetry and lossless by its norm, whatever the interpolation error of the table at μi.
 //!
 //! Sources: C. Kulla & A. Conty, *Revisiting physically based shading at Imageworks* (SIGGRAPH course 2017), the
-//! compensation, its tint and the split for dielectrics; C. Kelemen & L. Szirmay-Kalos (2001) for the form; S. Hill, *A
-//! multi-faceted exploration* (2018) for the tint's squared F_avg. The tables are computed here, by quadrature over visible normals.
+//! compensation, its tint and the split for dielectrics; C. Kelemen & L. Szirmay-Kalos (2001) for the form; S.
+//! Hill, *A multi-faceted exploration* (2018) for the tint's squared F_avg. The tables are computed here, by
+//! quadrature over visible normals.
 
 use super::albedo_table::{
     AlbedoTable, DirectionalCurve, PairCurve, PairTable, average_over_visible_normals, direction_at,
@@ -25,7 +25,8 @@ use std::sync::LazyLock;
 /// that it gives back is too small for single precision to tell 1 − E from 0.
 pub(crate) const LARGEST_SINGLE_SHARE: f32 = 0.9999;
 
-/// Kulla and Conty's lobe without its tint, times cos θi: the light that single scattering loses, given by `missing` = 1 − E.
+/// Kulla and Conty's lobe without its tint, times cos θi: the light that single scattering loses, given by
+/// `missing` = 1 − E.
 pub(crate) fn missing_lobe(missing: &DirectionalCurve<'_>, wo: Vec3, wi: Vec3) -> f32 {
     missing.at(wo) * missing.at(wi) * wi.z * FRAC_1_PI / missing.missing_average()
 }
@@ -39,8 +40,8 @@ pub(crate) fn multiple_bounce_tint(fresnel: Vec3, albedo_average: f32) -> Vec3 {
 pub(crate) struct ReflectionTables {
     /// 1 − E, of facets that reflect everything.
     pub(crate) missing: AlbedoTable,
-    /// Albedo of facets that reflect Schlick's (1 − wo·h)⁵, less (1 − μ)⁵: what is left is smooth even where the columns
-    /// are wide apart. See [`SchlickCurves`].
+    /// Albedo of facets that reflect Schlick's (1 − wo·h)⁵, less (1 − μ)⁵: what is left is smooth even where the
+    /// columns are wide apart. See [`SchlickCurves`].
     pub(crate) schlick: AlbedoTable,
 }
 
@@ -101,7 +102,7 @@ impl SchlickCurves {
         Self { pair: GGX_PAIR.curve(facets.mean_alpha().sqrt()), anisotropic }
     }
 
-    /// Both at a direction of the upper half.
+    /// Missing energy and Schlick's S at a direction of the upper half.
     pub(crate) fn at(&self, w: Vec3) -> SchlickAlbedo {
         let [missing, above_smooth] = self.pair.at(w.z);
         SchlickAlbedo {

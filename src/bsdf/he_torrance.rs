@@ -2,19 +2,19 @@
 //! wavelength, which look glossier the flatter one looks at them.
 //!
 //! Parameters: `eta` and `k`, index of refraction per linear RGB channel (k of 0 is a dielectric's face); the relief's
-//! root mean square height σ₀ and autocorrelation length τ in nanometres, both of a Gaussian relief; `diffuse`, albedo per
-//! channel in [0, 1] of what leaves after scattering beneath the surface or between its hills.
+//! root mean square height σ₀ and autocorrelation length τ in nanometres, both of a Gaussian relief; `diffuse`, albedo
+//! per channel in [0, 1] of what leaves after scattering beneath the surface or between its hills.
 //!
 //! In it: the specular term (a delta lobe of weight F·S·e^−g), the directional-diffuse term with its series, effective
-//! roughness and Smith's shadowing, at one wavelength a channel (610, 550, 465 nm), and the uniform-diffuse term. Left out:
-//! polarisation. Of own making: the uniform-diffuse term is coupled by (1 − F(μo))(1 − F(μi)), which the paper leaves a
-//! constant without a bound on energy, and the series beyond g = 40, expanded around its largest term. The
-//! Kirchhoff approximation beneath it all overshoots: a lossless relief of 50 nm over 1500 nm gives back 1.034 of the light
-//! at a cosine of 0.15.
+//! roughness and Smith's shadowing, at one wavelength a channel (610, 550, 465 nm), and the uniform-diffuse term. Left
+//! out: polarisation. Of own making: the uniform-diffuse term is coupled by (1 − F(μo))(1 − F(μi)), which the paper
+//! leaves a constant without a bound on energy, and the series beyond g = 40, expanded around its largest term. The
+//! Kirchhoff approximation beneath it all overshoots: a lossless relief of 50 nm over 1500 nm gives back 1.034 of the
+//! light at a cosine of 0.15.
 //!
-//! Source: X. He, K. Torrance, F. Sillion & D. Greenberg, *A comprehensive physical model for light reflection* (SIGGRAPH
-//! 1991), eqs. 5, 23 to 25, 57 to 79; its factor G is (v·v/v_z)² once the products of polarisation vectors are multiplied
-//! out. Not for coarse relief (use the conductor: it is the limit, and far cheaper).
+//! Source: X. He, K. Torrance, F. Sillion & D. Greenberg, *A comprehensive physical model for light reflection*
+//! (SIGGRAPH 1991), eqs. 5, 23 to 25, 57 to 79; its factor G is (v·v/v_z)² once the products of polarisation vectors
+//! are multiplied out. Not for coarse relief (use the conductor: it is the limit, and far cheaper).
 
 use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
@@ -236,8 +236,8 @@ impl HeTorrance {
 
 /// Σ g^m e^−g/(m·m!) e^(−x/m) over m ≥ 1.
 ///
-/// The terms are Poisson weights times a smooth function of m; where g is large that function is expanded to second order
-/// around m = g.
+/// The terms are Poisson weights times a smooth function of m; where g is large that function is expanded to
+/// second order around m = g.
 fn series(g: f32, x: f32) -> f32 {
     const LARGEST_SUMMED: f32 = 40.0;
     if g > LARGEST_SUMMED {

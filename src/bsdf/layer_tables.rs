@@ -1,15 +1,15 @@
 //! Tables of a coat over a metal: how often light meets the metal before it leaves, by the direction that it came from.
 //!
-//! Light that comes from outside at one direction is followed by [`super::layer_walk`]. What meets the metal once is a lobe
-//! of half-way vectors that takes what the coat lets in and out as seen from outside, which forgets that the coat's facets
-//! turn light beyond the critical angle: at a width of 0.2 over a smooth metal, seen at a cosine of 0.5, 47 % of what has
-//! entered is still inside after the first reflection, not 21 %. The lobe is therefore scaled, by the root of a share for each
-//! of both directions, until it brings out what the walk does. What it leaves is split as in the walk into light that meets
-//! the metal twice and light that meets it more often.
+//! Light that comes from outside at one direction is followed by [`super::layer_walk`]. What meets the metal once is a
+//! lobe of half-way vectors that takes what the coat lets in and out as seen from outside, which forgets that the
+//! coat's facets turn light beyond the critical angle: at a width of 0.2 over a smooth metal, seen at a cosine of 0.5,
+//! 47 % of what has entered is still inside after the first reflection, not 21 %. The lobe is therefore scaled, by the
+//! root of a share for each of both directions, until it brings out what the walk does. What it leaves is split as in
+//! the walk into light that meets the metal twice and light that meets it more often.
 //!
-//! That walk knows no azimuth. Where facets are wider along one axis than along the other, walk and scale are means over
-//! azimuths, but what the scaled lobe brings out is tabulated by azimuth, so that what it leaves is right whichever way light
-//! comes.
+//! That walk knows no azimuth. Where facets are wider along one axis than along the other, walk and scale are means
+//! over azimuths, but what the scaled lobe brings out is tabulated by azimuth, so that what it leaves is right
+//! whichever way light comes.
 //!
 //! Own work; the split of what is missing is Kulla and Conty's.
 
@@ -39,7 +39,7 @@ pub(super) struct LayerPoint {
     pub(super) second: f32,
     /// Share of it which leaves after it met the metal more often.
     pub(super) later: f32,
-    /// By its root at each of both directions the lobe of one reflection is scaled; in [0, 1].
+    /// Scale of the lobe of one reflection, in [0, 1]: its root at each of both directions multiplies the lobe.
     pub(super) brought_out: f32,
     /// Mean cosine at which light meets the metal, over that behind a smooth coat; in [0, 1].
     pub(super) steeper: f32,
@@ -189,7 +189,8 @@ impl Cell {
     }
 }
 
-/// Cells between which widths may lie: two for each width that a texture gives, of which [`WidthNodes`] has three at most.
+/// Cells between which widths may lie: two for each width that a texture gives, of which [`WidthNodes`] has three at
+/// most.
 const MOST_CELLS: usize = 8;
 
 /// The table at the widths of coat and metal: the cells beside them and their weights.

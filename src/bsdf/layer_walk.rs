@@ -1,9 +1,9 @@
 //! Light that goes to and fro between a coat and the metal beneath, by cosine alone.
 //!
-//! Where light goes depends on the cosine at which it comes: what a layer does to light is a matrix over a few cosines, and a
-//! function of the cosine (such as the share that leaves) is straight between them. Anisotropic facets do what they do on the
-//! average over azimuths: that light between the layers favours some of these is left out.
-//! Own work, in the manner of adding layers; the light between the facets of one layer is spread as by Kulla & Conty (2017).
+//! Where light goes depends on the cosine at which it comes: what a layer does to light is a matrix over a few cosines,
+//! and a function of the cosine (such as the share that leaves) is straight between them. Anisotropic facets do what
+//! they do on the average over azimuths: that light between the layers favours some of these is left out. Own work, in
+//! the manner of adding layers; the light between the facets of one layer is spread as by Kulla & Conty (2017).
 
 use super::albedo_table::{direction_at, visible_normals_and_weights};
 use super::dielectric_tables::transmitted;
@@ -16,11 +16,11 @@ use std::f32::consts::FRAC_PI_2;
 
 /// Nodes beyond the critical angle, equally spaced in the cosine.
 const TRAPPED: usize = 16;
-/// All nodes. The others are the table's columns, refracted: what a smooth coat lets out is steep at the critical angle, and
-/// smooth by the cosine outside.
+/// All nodes. The others are the table's columns, refracted: what a smooth coat lets out is steep at the critical
+/// angle, and smooth by the cosine outside.
 const CROSSINGS: usize = TRAPPED + COLUMNS;
-/// Reflections off the metal that are followed. What has entered and is left then is 0.6 % at widths of 0.03 over 0, and less
-/// where layers are rougher; between smooth ones it never leaves.
+/// Reflections off the metal that are followed. What has entered and is left then is 0.6 % at widths of 0.03 over 0,
+/// and less where layers are rougher; between smooth ones it never leaves.
 const REFLECTIONS: usize = 64;
 
 /// Azimuths of a quadrant over which what anisotropic facets do is averaged.
@@ -29,21 +29,21 @@ const AZIMUTHS: usize = 8;
 /// What layers do at one azimuth and another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum OverAzimuths {
-    /// The same.
+    /// The same at all azimuths.
     Alike,
-    /// Not the same.
+    /// Not the same at all azimuths.
     Varying,
 }
 
 impl OverAzimuths {
-    /// Of layers with such facets, or none.
+    /// What layers with such facets, or none, do at different azimuths.
     pub(super) fn of<'a>(facets: impl IntoIterator<Item = &'a Microfacets>) -> Self {
         if facets.into_iter().all(Microfacets::is_isotropic) { Self::Alike } else { Self::Varying }
     }
 }
 
-/// Directions of cosine `mu` and how much each counts: one where all azimuths are alike, else the middles of equal parts of a
-/// quadrant.
+/// Directions of cosine `mu` and how much each counts: one where all azimuths are alike, else the middles of
+/// equal parts of a quadrant.
 pub(super) fn directions(mu: f32, over_azimuths: OverAzimuths) -> impl Iterator<Item = (f32, Vec3)> {
     let along_x = direction_at(mu);
     let count = match over_azimuths {
@@ -91,7 +91,7 @@ impl Row {
         }
     }
 
-    /// The same shape with a total of 1, or nothing.
+    /// This row with a total of 1, or nothing.
     fn normalized(mut self) -> Self {
         let total = self.total().max(1e-12);
         self.0.iter_mut().for_each(|value| *value /= total);
@@ -123,7 +123,7 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// For a coat of relative index `eta`, at least 1.
+    /// Nodes for a coat of relative index `eta`, at least 1.
     pub(super) fn new(eta: f32) -> Self {
         let critical_cosine = (1.0 - 1.0 / (eta * eta)).max(0.0).sqrt();
         let cosines = Row(std::array::from_fn(|node| match node.checked_sub(TRAPPED) {
@@ -273,7 +273,8 @@ impl Underside {
     }
 }
 
-/// Share of light that leaves after it met the metal's facets just so many times, by the cosine at which it first comes.
+/// Share of light that leaves after it met the metal's facets just so many times, by the cosine at which it first
+/// comes.
 pub(super) struct LeavingByReflections(Vec<Row>);
 
 /// Follows light from the metal on.

@@ -12,7 +12,7 @@ const ANISOTROPIC_NODES: [usize; 3] = [12, 9, 8];
 /// Which slope widths the facets of a layer may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LayerWidths {
-    /// The same along every azimuth; a model of other facets takes their mean width for all.
+    /// Facets of the same width along every azimuth; a model of other facets takes their mean width for all.
     Isotropic(WidthRange),
     /// Such along x and along y.
     Anisotropic([WidthRange; 2]),
@@ -47,8 +47,8 @@ pub(super) struct WidthNodes {
 }
 
 impl WidthNodes {
-    /// Those of coat and metal. Where textures give all four widths, the coat's are of the mean: tables over four widths
-    /// would be too many to compute.
+    /// Widths of coat and metal for which there are tables. Where textures give all four widths, the coat's are of the
+    /// mean: tables over four widths would be too many to compute.
     pub(super) fn of_layers([coat, base]: [LayerWidths; 2]) -> [Self; 2] {
         let textures = coat.textures() + base.textures();
         let coat = if textures > ANISOTROPIC_NODES.len() { LayerWidths::Isotropic(WidthRange::Textured) } else { coat };

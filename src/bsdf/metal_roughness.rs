@@ -1,15 +1,15 @@
 //! The material of glTF 2.0: a mix of a metal and of a dielectric coat over a diffuse base, with the extensions for the
 //! index of refraction and for thin transmission.
 //!
-//! Parameters: `base_color` per linear RGB channel in [0, 1] (reflectance of the metal at normal incidence, albedo of the
-//! base); `metallic` in [0, 1]; `roughness` in [0, 1], perceptual; `ior` of the dielectric, at least 1, or 0 for a coat
-//! that reflects everything, as the extension defines; `transmission` in [0, 1], the share of what passes the coat that goes straight through instead of being
-//! scattered back, tinted by `base_color`, blurred like the reflection.
+//! Parameters: `base_color` per linear RGB channel in [0, 1] (reflectance of the metal at normal incidence, albedo of
+//! the base); `metallic` in [0, 1]; `roughness` in [0, 1], perceptual; `ior` of the dielectric, at least 1, or 0 for a
+//! coat that reflects everything, as the extension defines; `transmission` in [0, 1], the share of what passes the coat
+//! that goes straight through instead of being scattered back, tinted by `base_color`, blurred like the reflection.
 //!
-//! Sources: Khronos Group, *glTF 2.0* (2021), appendix B, with KHR_materials_ior and KHR_materials_transmission; the base
-//! is coupled to the coat as Kelemen & Szirmay-Kalos (2001), eq. 5, and Kulla & Conty (2017), so that no light is lost:
-//! the base sees (1 − E(μo))(1 − E(μi))/(π(1 − E_avg)) with E the coat's albedo, where the specification's own sample code
-//! uses 1 − F(h) and is not lossless. Not for metals by measured index, nor for glass with an inside.
+//! Sources: Khronos Group, *glTF 2.0* (2021), appendix B, with KHR_materials_ior and KHR_materials_transmission; the
+//! base is coupled to the coat as Kelemen & Szirmay-Kalos (2001), eq. 5, and Kulla & Conty (2017), so that no light is
+//! lost: the base sees (1 − E(μo))(1 − E(μi))/(π(1 − E_avg)) with E the coat's albedo, where the specification's own
+//! sample code uses 1 − F(h) and is not lossless. Not for metals by measured index, nor for glass with an inside.
 
 use super::energy::{self, SchlickAlbedo, SchlickCurves};
 use super::fresnel::{SCHLICK_AVERAGE, normal_reflectance, schlick_weight};

@@ -3,10 +3,11 @@
 //! Parameters: slope widths αx and αy along the local x and y axes, in [1e-3, 1]. GGX has the long tails of most real
 //! surfaces; Beckmann's Gaussian slopes fit some polymers and polished metals better.
 //!
-//! Sources: T. Trowbridge & K. Reitz (1975); P. Beckmann & A. Spizzichino (1963); B. Walter et al., *Microfacet models for
-//! refraction through rough surfaces* (2007), eqs. 25 and 33; E. Heitz, *Understanding the masking-shadowing function*
-//! (2014), eqs. 72, 86 and 99 (anisotropic forms and the height-correlated G2); J. Dupuy & A. Benyoub, *Sampling visible
-//! GGX normals with spherical caps* (2023), listing 3. Visible Beckmann normals: see [`super::beckmann`].
+//! Sources: T. Trowbridge & K. Reitz (1975); P. Beckmann & A. Spizzichino (1963); B. Walter et al., *Microfacet
+//! models for refraction through rough surfaces* (2007), eqs. 25 and 33; E. Heitz, *Understanding the
+//! masking-shadowing function* (2014), eqs. 72, 86 and 99 (anisotropic forms and the height-correlated G2); J.
+//! Dupuy & A. Benyoub, *Sampling visible GGX normals with spherical caps* (2023), listing 3. Visible Beckmann
+//! normals: see [`super::beckmann`].
 
 use super::{SMALLEST_ALPHA, beckmann, warp};
 use crate::scene::Distribution;
@@ -34,7 +35,7 @@ impl Microfacets {
         Self { alpha_x: alpha_x.clamp(0.0, 1.0), alpha_y: alpha_y.clamp(0.0, 1.0), distribution }
     }
 
-    /// The same width along every azimuth.
+    /// Facets of the same slope width along every azimuth, in [0, 1].
     pub fn isotropic(alpha: f32, distribution: Distribution) -> Self {
         Self::new(alpha, alpha, distribution)
     }

@@ -1,7 +1,7 @@
 //! Two models side by side, finer than the eye can see: rust on iron, dust on paint.
 //!
-//! Parameter: `amount` in [0, 1], the share of the second. The value is the weighted sum; a sample comes from one of the
-//! two and is weighted by the whole mixture, so that value and pdf always agree.
+//! Parameter: `amount` in [0, 1], the share of the second. The value is the weighted sum; a sample comes from one of
+//! the two and is weighted by the whole mixture, so that value and pdf always agree.
 //!
 //! Source: the one-sample model of multiple importance sampling, E. Veach (1997), section 9.2.4. Not for layers, where
 //! light passes through the upper one twice: see the coated models.
@@ -18,7 +18,7 @@ pub struct Mix<'a> {
 }
 
 impl<'a> Mix<'a> {
-    /// Both models and the second's share in [0, 1].
+    /// A mix of both models; `amount` is the second's share, held to [0, 1].
     pub fn new(first: &'a Bsdf<'a>, second: &'a Bsdf<'a>, amount: f32) -> Self {
         Self { first, second, amount: amount.clamp(0.0, 1.0) }
     }

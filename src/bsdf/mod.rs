@@ -85,7 +85,7 @@ pub struct BsdfEvaluation {
 }
 
 impl BsdfEvaluation {
-    /// Nothing is scattered and nothing is ever sampled.
+    /// The evaluation where nothing is scattered and nothing is ever sampled.
     pub const BLACK: Self = Self { value: Vec3::ZERO, pdf: 0.0 };
 
     /// The sample of a smooth lobe that chose `wi`, or `None` where it carries nothing.
@@ -104,7 +104,7 @@ impl BsdfEvaluation {
         })
     }
 
-    /// The same seen from the other side of the surface: for models that turn both directions over.
+    /// A sample as seen from the other side of the surface: for models that turn both directions over.
     fn sample_turned(self, wi: Vec3, wo: Vec3) -> Option<BsdfSample> {
         self.into_sample(wi).map(|sample| sample.turned_like(wo))
     }
@@ -121,8 +121,8 @@ pub struct BsdfSample {
     pub pdf: f32,
     /// Which kind of lobe was chosen.
     pub lobe: Lobe,
-    /// Where the path entered or left a volume: the index of refraction that it comes into over the one it leaves. `None`
-    /// for reflection, and for transmission through sheets without an inside.
+    /// Where the path entered or left a volume: the index of refraction that it comes into over the one it leaves.
+    /// `None` for reflection, and for transmission through sheets without an inside.
     pub crossed_index: Option<f32>,
 }
 
@@ -222,8 +222,8 @@ impl<'a> Bsdf<'a> {
         Self::Conductor(Conductor::new(eta, k, Vec3::ONE, facets.into(), None))
     }
 
-    /// Boundary of a volume whose index is `eta_inside_over_outside`; `transmittance` tints each crossing. Without `tables`
-    /// a rough boundary loses the light that bounces between its facets.
+    /// Boundary of a volume whose index is `eta_inside_over_outside`; `transmittance` tints each crossing. Without
+    /// `tables` a rough boundary loses the light that bounces between its facets.
     pub fn dielectric(
         eta_inside_over_outside: f32,
         facets: impl Into<Microfacets>,
@@ -388,8 +388,8 @@ trait Reflector {
     /// For two directions above the surface.
     fn evaluate_front(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation;
 
-    /// A direction for a `wo` above the surface, by the density that [`Reflector::evaluate_front`] states; one below the surface
-    /// carries nothing.
+    /// A direction for a `wo` above the surface, by the density that [`Reflector::evaluate_front`] states; one below
+    /// the surface carries nothing.
     fn sample_front(&self, wo: Vec3, u: [f32; 3]) -> Vec3;
 
     fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {

@@ -1,12 +1,13 @@
 //! Rough diffuse reflection: a surface of Lambertian grooves, flatter than a Lambertian one (the moon, clay, cloth).
 //!
-//! Parameters: `reflectance` ρ per linear RGB channel in [0, 1], the albedo of the grooves' walls (1 reflects everything,
-//! darker colours come out a little darker and more saturated with roughness); `roughness` in [0, 1], 0 being Lambert.
+//! Parameters: `reflectance` ρ per linear RGB channel in [0, 1], the albedo of the grooves' walls (1 reflects
+//! everything, darker colours come out a little darker and more saturated with roughness); `roughness` in [0, 1], 0
+//! being Lambert.
 //!
 //! Sources: M. Oren & S. Nayar (1994) for the phenomenon; Y. Fujii's qualitative form, made energy-preserving by J.
-//! Portsmouth, P. Kutz & S. Hill, *EON: a practical energy-preserving rough diffuse BRDF* (2024): the single-scattering lobe
-//! with its closed-form albedo, and the reciprocal lobe for light between grooves. Not for glossy surfaces, nor where the
-//! original's exact angular shape matters.
+//! Portsmouth, P. Kutz & S. Hill, *EON: a practical energy-preserving rough diffuse BRDF* (2024): the single-scattering
+//! lobe with its closed-form albedo, and the reciprocal lobe for light between grooves. Not for glossy surfaces, nor
+//! where the original's exact angular shape matters.
 
 use super::{BsdfEvaluation, Reflector, warp};
 use glam::Vec3;

@@ -1,12 +1,12 @@
 //! The modified Phong model: a diffuse base and a lobe around the mirror direction.
 //!
-//! Parameters: `diffuse` and `specular` albedo per linear RGB channel in [0, 1], their sum at most 1; `exponent` n of the
-//! lobe, at least 0. f = ρd/π + ρs (n + 2)/(2π) cosⁿα, α being the angle between wi and the mirror direction of wo.
+//! Parameters: `diffuse` and `specular` albedo per linear RGB channel in [0, 1], their sum at most 1; `exponent` n of
+//! the lobe, at least 0. f = ρd/π + ρs (n + 2)/(2π) cosⁿα, α being the angle between wi and the mirror direction of wo.
 //!
-//! Sources: B. T. Phong (1975) for the lobe; R. Lewis, *Making shaders more physically plausible* (1994), and E. Lafortune &
-//! Y. Willems, *Using the modified Phong reflectance model for physically based rendering* (1994), for the reciprocal form
-//! and its norm, with which the lobe's albedo is ρs face on and falls towards grazing angles, where part of it would lie below
-//! the surface. Not for metals or plastic: there is no Fresnel effect.
+//! Sources: B. T. Phong (1975) for the lobe; R. Lewis, *Making shaders more physically plausible* (1994), and E.
+//! Lafortune & Y. Willems, *Using the modified Phong reflectance model for physically based rendering* (1994), for the
+//! reciprocal form and its norm, with which the lobe's albedo is ρs face on and falls towards grazing angles, where
+//! part of it would lie below the surface. Not for metals or plastic: there is no Fresnel effect.
 
 use super::{BsdfEvaluation, Reflector, warp};
 use glam::Vec3;

@@ -1,8 +1,9 @@
 //! The fibres of glTF's sheen.
 //!
-//! Sources: Khronos Group, KHR_materials_sheen; A. Estevez & C. Kulla, *Production friendly microfacet sheen BRDF* (2017), eq. 2,
-//! for the fibres' distribution; D. Neubelt & M. Pettineo (2013) for their visibility 1/(4(cos θo + cos θi − cos θo cos θi)), with
-//! which fibres of roughness below 0.5 reflect more than comes in at grazing angles, and are scaled down by as much.
+//! Sources: Khronos Group, KHR_materials_sheen; A. Estevez & C. Kulla, *Production friendly microfacet sheen BRDF*
+//! (2017), eq. 2, for the fibres' distribution; D. Neubelt & M. Pettineo (2013) for their visibility 1/(4(cos θo + cos
+//! θi − cos θo cos θi)), with which fibres of roughness below 0.5 reflect more than comes in at grazing angles, and
+//! are scaled down by as much.
 
 use super::albedo_table::{AlbedoTable, direction_at};
 use glam::Vec3;
@@ -86,7 +87,7 @@ impl Sheen {
 mod tests {
     use super::*;
 
-    /// All were scaled down by 1.02, which is for those that reflect more than comes in.
+    /// Regression: all fibres were scaled down by 1.02, which is for those that reflect more than comes in.
     #[test]
     fn fibres_are_scaled_down_only_where_they_reflect_more_than_comes_in() {
         for (roughness, is_scaled) in [(0.2, true), (0.3, true), (0.7, false), (1.0, false)] {

@@ -1,11 +1,11 @@
-//! A thin clear sheet, such as a window pane or a soap film seen as a surface without inside: light is reflected or goes
-//! straight on, with all reflections between the sheet's two faces summed up.
+//! A thin clear sheet, such as a window pane or a soap film seen as a surface without inside: light is reflected or
+//! goes straight on, with all reflections between the sheet's two faces summed up.
 //!
 //! Parameters: `ior`, index of refraction of the sheet over its surroundings, above 0; `transmittance`, tint of what
 //! goes through, per linear RGB channel in [0, 1].
 //!
-//! Source: Pharr, Jakob & Humphreys, *Physically Based Rendering* (2023), section 9.5 (R + T²R/(1 − R²) = 2R/(1 + R) of a
-//! lossless sheet). Not for thick glass, which shifts and refracts what is seen through it.
+//! Source: Pharr, Jakob & Humphreys, *Physically Based Rendering* (2023), section 9.5 (R + T²R/(1 − R²) = 2R/(1 + R) of
+//! a lossless sheet). Not for thick glass, which shifts and refracts what is seen through it.
 
 use super::mirror::reflect_about_normal;
 use super::{BsdfSample, Lobe, fresnel};

@@ -1,15 +1,16 @@
-//! The upper layers of glTF's materials: a clear coat, and a sheen of fibres, over the metal-roughness model or the boundary of a volume.
+//! The upper layers of glTF's materials: a clear coat, and a sheen of fibres, over the metal-roughness model or
+//! the boundary of a volume.
 //!
 //! Parameters: `clearcoat`, coverage in [0, 1] of a coat of index 1.5, and its perceptual roughness in [0, 1];
 //! `sheen_color` per linear RGB channel in [0, 1], and `sheen_roughness` in [0, 1], perceptual.
 //!
-//! A layer that reflects E(ω) lets (1 − E(ωo))(1 − E(ωi))/(1 − E(normal)) through to what lies beneath: reciprocal, and never
-//! more than came in, since a layer passes most face on. It is right face on and loses light towards grazing angles, where
-//! what the layer turns back inside is not followed. What goes through a volume's boundary passes the layer once, by
-//! 1 − E of the direction outside; light that stays inside does not meet it.
+//! A layer that reflects E(ω) lets (1 − E(ωo))(1 − E(ωi))/(1 − E(normal)) through to what lies beneath: reciprocal, and
+//! never more than came in, since a layer passes most face on. It is right face on and loses light towards grazing
+//! angles, where what the layer turns back inside is not followed. What goes through a volume's boundary passes the
+//! layer once, by 1 − E of the direction outside; light that stays inside does not meet it.
 //!
-//! A coat may be smooth over bumps: then it has a frame of its own, and what is on the one side of it and on the other of what lies
-//! beneath passes nothing.
+//! A coat may be smooth over bumps: then it has a frame of its own, and what is on the one side of it and on the other
+//! of what lies beneath passes nothing.
 //!
 //! Source: Khronos Group, KHR_materials_clearcoat. The fibres are in [`super::sheen`].
 
@@ -86,7 +87,8 @@ fn coat_of(roughness: f32) -> Coat<'static> {
     COAT.coat(Microfacets::from(roughness.clamp(0.0, 1.0)).rough().as_ref())
 }
 
-/// What a clear coat of such coverage and roughness leaves of light that comes from beneath it and goes on at this cosine, in [0, 1].
+/// What a clear coat of such coverage and roughness leaves of light that comes from beneath it and goes on at this
+/// cosine, in [0, 1].
 pub fn passed_by_clearcoat(clearcoat: f32, roughness: f32, cosine: f32) -> f32 {
     1.0 - clearcoat.clamp(0.0, 1.0) * coat_of(roughness).reflectance(direction_at(cosine.clamp(0.0, 1.0)))
 }
@@ -138,8 +140,8 @@ impl<'a> Varnish<'a> {
         }
     }
 
-    /// The same where what lies beneath the coat has another normal. Directions are then in the frame of the coat, and the rotation
-    /// takes them to that of the fibres and the base.
+    /// These layers where what lies beneath the coat has another normal. Directions are then in the frame of the coat,
+    /// and the rotation takes them to that of the fibres and the base.
     pub fn over_relief(self, to_base: Option<Mat3>) -> Self {
         Self { to_base, ..self }
     }

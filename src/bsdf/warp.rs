@@ -5,8 +5,8 @@
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 
-/// Sine and cosine of `turns`·2π, for turns in [0, 1]; within 3e-7. By polynomials: the system's functions take three times as long and
-/// round differently from machine to machine.
+/// Sine and cosine of `turns`·2π, for turns in [0, 1]; within 3e-7. By polynomials: the system's functions take three
+/// times as long and round differently from machine to machine.
 pub(crate) fn sin_cos_of_turns(turns: f32) -> (f32, f32) {
     // Halves go up; `round` is a call on machines without SSE4.1.
     let quarter = (4.0 * turns + 0.5) as u32;
@@ -47,7 +47,7 @@ pub(crate) struct GrazingHemisphere {
 }
 
 impl GrazingHemisphere {
-    /// For a microfacet surface of slope width `alpha` in (0, 1].
+    /// The warp for a microfacet surface of slope width `alpha` in (0, 1].
     pub(crate) fn new(alpha: f32) -> Self {
         // c = α for smooth surfaces; at α = 1 large, and the distribution all but cosine.
         let spread2 = alpha * alpha / (1.02 - alpha);

@@ -1,4 +1,5 @@
-//! The format: header and state as a sealed file.
+//! Writes and reads the format of checkpoints: header and state as a sealed file. What it may be continued or merged
+//! with is left to the callers.
 
 use super::{Checkpoint, Header};
 use crate::adaptive::audit::MOST_INFLATION;
@@ -20,7 +21,7 @@ const HEADER_LIMIT: u64 = 1 << 20;
 /// Why a film's file could not be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// It is not a whole film.
+    /// The file is not a whole film.
     #[error(transparent)]
     Sealed(#[from] SealedError),
     /// Sound, but not of this render.
@@ -33,10 +34,12 @@ pub enum CheckpointError {
     },
 }
 
-/// Writes beside `path` and renames, so that a kill at any moment leaves the old file or the new one. Returns its length.
+/// Writes beside `path` and renames, so that a kill at any moment leaves the old file or the new one. Returns its
+/// length.
 ///
 /// # Errors
-/// As [`crate::output::write_beside`], and for what [`read_checkpoint`] would refuse: who reads it would begin anew, again and again.
+/// As [`crate::output::write_beside`], and for what [`read_checkpoint`] would refuse: who reads it would
+/// begin anew, again and again.
 pub fn write_checkpoint(path: &Path, header: &Header, state: &RenderState) -> Result<u64, OutputError> {
     check(header, state).map_err(|problem| OutputError::Unreadable { path: path.to_owned(), problem })?;
     FILM.write(path, &(header, state))

@@ -1,4 +1,4 @@
-//! What was rendered and for whom: small, at the start of the film's file.
+//! What was rendered and for whom: small, at the start of the film's file. It can be read without the film behind it.
 
 use super::tracing::Tracing;
 use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
@@ -15,8 +15,9 @@ use fechner_perception::tone::{self, SavedTone, ToneSettings};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// This program, its version and what of its build changes the last bits of a sample: where the target has fused multiply-add
-/// (`-C target-cpu=native` without `-C target-feature=-fma`), glam's `Vec3A::cross` and `lerp` use it.
+/// Name of this program, its version and what of its build changes the last bits of a sample: where the
+/// target has fused multiply-add (`-C target-cpu=native` without `-C target-feature=-fma`), glam's
+/// `Vec3A::cross` and `lerp` use it.
 pub const PROGRAM: &str = if cfg!(target_feature = "fma") {
     concat!("fechner ", env!("CARGO_PKG_VERSION"), ", built for FMA")
 } else {
@@ -30,16 +31,16 @@ pub struct Header {
     pub origin: Origin,
     /// Whose random numbers they used.
     pub seeds: Seeds,
-    /// For whose eyes they were spread.
+    /// Settings for whose eyes the samples were spread.
     pub settings: SettingsRecord,
     /// Visibility that was aimed at.
     pub visibility: f64,
-    /// And before, in renders that this one goes on from, first to last.
+    /// Visibilities that were aimed at before, in renders that this one goes on from, first to last.
     pub earlier_visibilities: Vec<f64>,
 }
 
 impl Header {
-    /// Of a render from the beginning with one seed.
+    /// The header of a render from the beginning with one seed.
     #[must_use]
     pub fn begun(origin: Origin, seed: u64, settings: SettingsRecord, visibility: f64) -> Self {
         Self { origin, seeds: Seeds::one(seed), settings, visibility, earlier_visibilities: Vec::new() }
@@ -50,7 +51,7 @@ impl Header {
 /// may be added or continued.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
-    /// Its [`PROGRAM`].
+    /// [`PROGRAM`] of the build that traced the samples.
     pub program: String,
     /// The scene's name or, where a file of it was rendered, that file's, for messages and reports.
     pub scene_name: String,
@@ -65,7 +66,7 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// Of a render.
+    /// The origin of a render's samples.
     pub fn of(scene: &Scene, settings: &TraceSettings) -> Self {
         let Crop { width, height, .. } = settings.film_area();
         Self {
@@ -116,7 +117,7 @@ impl Origin {
 /// Seeds of a film's samples.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Seeds {
-    /// All of them, ascending.
+    /// All seeds, ascending.
     pub all: Vec<u64>,
     /// The one by which the render goes on; none in a merged film, which goes on by a new one.
     pub current: Option<u64>,
@@ -141,7 +142,7 @@ pub struct SettingsRecord {
     pub exposure_stops: Option<f64>,
     /// The operator as fitted to something else than the picture: to the whole or the shot of which it is a part.
     pub fitted: Option<SavedTone>,
-    /// Of a frame of a moving picture, whose noise is gone in the next: how frames follow.
+    /// How frames follow, for a frame of a moving picture, whose noise is gone in the next; `None` for a still.
     pub frames: Option<FrameTiming>,
     /// Where one looks, in pixels of the film; none where anybody may look anywhere.
     pub gazes: Vec<Gaze>,
@@ -196,7 +197,7 @@ impl Seeds {
 }
 
 impl SettingsRecord {
-    /// Of the default loop, as [`LoopSettings::new`] has it.
+    /// The record of the default loop, as [`LoopSettings::new`] has it.
     pub fn new(viewing: Viewing, nits_per_unit: f64, operator: impl Into<String>) -> Self {
         Self {
             sampling: Sampling::Adaptive,
@@ -214,8 +215,8 @@ impl SettingsRecord {
         }
     }
 
-    /// Settings for the loop over samples that were traced so, less the importance map, of which only the hash is here; the
-    /// denoiser is opened.
+    /// Settings for the loop over samples that were traced so, less the importance map, of which only the hash is
+    /// here; the denoiser is opened.
     ///
     /// # Errors
     /// For names that nobody answers to, and denoisers that are not installed.

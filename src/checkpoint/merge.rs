@@ -1,4 +1,4 @@
-//! Adding up renders of different seeds.
+//! Adds up renders of different seeds. Not for pictures: only films keep what adding takes.
 
 use super::file::read_header;
 use super::{Checkpoint, CheckpointError, Header, Seeds, read_checkpoint};
@@ -35,16 +35,17 @@ pub enum MergeError {
 }
 
 /// Adds the films of several files: half A to half A and B to B, in the order of their seeds, so that the order of
-/// `paths` does not matter. Of a render whose halves are uneven, as with 1 sample a pixel, an odd seed's are added the other way round, so that the
-/// sum of many is even: eight films of one sample had 8 samples in half A, none in B, and told nothing of their noise. What was decided for the
-/// single films (plans, rungs, audits) is left behind; the largest inflation stays. Sums of sums hold the same samples, and may differ in the last
-/// bits of variances and first surfaces.
+/// `paths` does not matter. Of a render whose halves are uneven, as with 1 sample a pixel, an odd seed's are added the
+/// other way round, so that the sum of many is even. Eight films of one sample would else have 8 samples in half A,
+/// none in B, and tell nothing of their noise. What was decided for the single films (plans, rungs, audits) is left
+/// behind; the largest inflation stays. Sums of sums hold the same samples, and may differ in the last bits of
+/// variances and first surfaces.
 ///
 /// Beside the sum, as many films are in memory as there are threads, at most 8.
 ///
 /// # Errors
-/// [`MergeError`] for no file at all, a file that cannot be read, films of other scenes, sizes, versions or viewings than the first, and
-/// films that share a seed.
+/// [`MergeError`] for no file at all, a file that cannot be read, films of other scenes, sizes, versions or viewings
+/// than the first, and films that share a seed.
 pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     let mut files = Vec::with_capacity(paths.len());
     for path in paths {
@@ -72,8 +73,8 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     Ok(sum)
 }
 
-/// A render's film as it goes into a sum. By its own seed alone, so that neither order nor grouping changes which samples a half has; sums
-/// stay as they are.
+/// A render's film as it goes into a sum. By its own seed alone, so that neither order nor grouping changes which
+/// samples a half has; sums stay as they are.
 fn balanced(Checkpoint { header, state }: Checkpoint) -> Checkpoint {
     let is_odd = matches!((&header.seeds.all[..], header.seeds.current), ([seed], Some(_)) if seed % 2 == 1);
     let film = if is_odd && state.film.has_uneven_halves() { state.film.with_halves_swapped() } else { state.film };

@@ -1,4 +1,5 @@
-//! The film's file: all sums of a render and all that decides what comes next, so that resume and merge need nothing else.
+//! The film's file: all sums of a render and all that decides what comes next, so that resume and merge need nothing
+//! else.
 //!
 //! [`write_checkpoint`] and [`read_checkpoint`] know the format, [`merge_files`] adds up films of different seeds,
 //! [`Header`] says what a film may be continued by. Not a picture format: `fechner merge` makes pictures of it.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Tracing(TraceSettings);
 
 impl Tracing {
-    /// Of a render.
+    /// How a render traces its samples, whatever its seed.
     pub fn of(settings: &TraceSettings) -> Self {
         Self(TraceSettings { seed: 0, ..*settings })
     }
@@ -18,7 +18,8 @@ impl Tracing {
         &self.0
     }
 
-    /// "max depth 1000, filter gaussian, crop 8,0,32,16". Settings that ask for nothing, and the picture's size, are left out.
+    /// "max depth 1000, filter gaussian, crop 8,0,32,16". Settings that ask for nothing, and the picture's size, are
+    /// left out.
     pub fn in_words(&self) -> String {
         joined(self.said().into_iter().filter(|setting| setting.asks))
     }

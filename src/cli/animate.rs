@@ -1,4 +1,4 @@
-//! `fechner animate`: the frames of a scene that moves, and a video of them.
+//! `fechner animate`: the frames of a scene that moves, and a video of them. How one frame is made is left to `shot`.
 
 mod contact;
 mod frames;

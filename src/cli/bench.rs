@@ -1,4 +1,4 @@
-//! `fechner bench`: what adaptive sampling saves.
+//! `fechner bench`: what adaptive sampling saves. What is measured is left to `fechner::benchmark`.
 
 mod tables;
 

@@ -58,7 +58,8 @@ pub(super) fn motion_planes(path: &Path, exr: &ExrImage) -> Result<FrameMotion> 
     Ok(FrameMotion { to_next: planes(to_next)?, to_previous: planes(to_previous)? })
 }
 
-/// One component of motion over the display window. What is not finite, which a note says, and what has no pixels, rests.
+/// One component of motion over the display window. What is not finite, which a note says, and what has no pixels,
+/// rests.
 fn motion_plane(path: &Path, exr: &ExrImage, values: Vec<f32>) -> Result<Plane> {
     if values.iter().any(|value| !value.is_finite()) {
         note(path, "motion that is not finite was replaced: it rests there");
@@ -126,8 +127,8 @@ const MOTION_LAYERS: [&str; 7] = ["velocity", "vector", "motion", "motionvector"
 /// What the two parts of a vector are called.
 const VECTOR_PARTS: [[&str; 2]; 3] = [["X", "Y"], ["U", "V"], ["R", "G"]];
 
-/// Layers whose y is upwards: Nuke's names, and those of renderers that write for it. All others are taken to have it downwards, as
-/// their pixels are numbered.
+/// Layers whose y is upwards: Nuke's names, and those of renderers that write for it. All others are taken to have it
+/// downwards, as their pixels are numbered.
 const UPWARD_LAYERS: [&str; 2] = ["forward", "backward"];
 
 /// Motion in pixels: the layer's name, and its channels along x and y as they stand in the file.
@@ -157,8 +158,8 @@ struct BothMotions {
 /// What layers of motion to the previous frame are called.
 const BACKWARD_LAYERS: [&str; 2] = ["velocity_previous", "backward"];
 
-/// Both motions: ours, Blender's `Vector` of four, or any that [`motion`] and [`backward_motion`] find. Of one alone things are taken to move
-/// as much the other way.
+/// Both motions: ours, Blender's `Vector` of four, or any that [`motion`] and [`backward_motion`] find. Of one alone
+/// things are taken to move as much the other way.
 fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
     let negated = |values: &[f32]| values.iter().map(|value| -value).collect::<Vec<f32>>();
     let names = exr.names();
@@ -285,7 +286,8 @@ mod tests {
         assert_eq!(guess(&exr(&beside_luminance)), None);
     }
 
-    /// Views and render layers of one file: pictures that differed in the second alone were the same to `compare`, without a word.
+    /// Views and render layers of one file. Regression: pictures that differed in the second alone were the same to
+    /// `compare`, without a word.
     #[test]
     fn of_several_pictures_all_are_named() {
         let of = |layers: [&str; 3]| {
@@ -412,7 +414,7 @@ mod tests {
         assert_eq!(of(&["R", "G", "B"]), None);
     }
 
-    /// Renderers that know only where things were were refused.
+    /// Regression: files of renderers that know only where things were before were refused.
     #[test]
     fn motion_to_the_previous_frame_alone_goes_on() {
         let of = |names: &[&str]| {

@@ -1,5 +1,5 @@
-//! The right to write a film's file, which one process has at a time: of two that write one file, the one that writes last would
-//! throw away what the other sampled.
+//! The right to write a film's file, which one process has at a time: of two that write one file, the one that writes
+//! last would throw away what the other sampled. Not for pictures, which are renamed into place.
 
 use super::targets::location;
 use anyhow::{Context, Result, bail};
@@ -16,7 +16,7 @@ pub(super) struct Claim {
 }
 
 impl Claim {
-    /// Of the film at this path, there or not.
+    /// Claims the film at this path, there or not.
     ///
     /// # Errors
     /// If another process has it.

@@ -218,7 +218,7 @@ fn tell(figures: &Figures) {
     );
 }
 
-/// Only pictures of one size and shape can be compared.
+/// Refuses pictures that are not of one size and shape, which cannot be compared.
 pub(super) fn check_alike(
     (reference_file, reference): (&Path, Shape),
     (test_file, test): (&Path, Shape),

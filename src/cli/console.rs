@@ -99,7 +99,7 @@ impl Counter {
         Self { what, total, on_terminal: std::io::stderr().is_terminal(), said: Cell::new(Instant::now()) }
     }
 
-    /// So many are done.
+    /// Tells that so many are done, if it is time to.
     pub(super) fn count(&self, done: usize) {
         if let Some(words) = self.words(done, Instant::now()) {
             say::part(format_args!("{words}"));

@@ -1,4 +1,4 @@
-//! The option `--denoise`.
+//! The option `--denoise`, and the pilot that it asks for. Whether the library is there is not known here.
 
 use clap::ValueEnum;
 use fechner::adaptive::settings::DENOISED_PILOT_SAMPLES_A_PIXEL;

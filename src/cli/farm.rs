@@ -1,4 +1,5 @@
-//! `fechner farm`: one render by many processes that share a folder.
+//! `fechner farm`: one render by many processes that share a folder. What a frame is made of is left to
+//! `fechner::farm`.
 
 mod job;
 mod merge;

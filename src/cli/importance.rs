@@ -1,4 +1,4 @@
-//! `--importance`: a picture whose values multiply the thresholds.
+//! Reads `--importance`: a picture whose values multiply the thresholds.
 
 use super::picture::InputPicture;
 use anyhow::{Result, bail};
@@ -9,11 +9,13 @@ use std::path::Path;
 /// Widths over heights that differ by less than this share are the same: a small map's size is rounded to pixels.
 const SAME_SHAPE: f64 = 0.02;
 
-/// The least value: counts are found down to a tenth of it, and no noise is asked to be so much less than what can be seen.
+/// The least value: counts are found down to a tenth of it, and no noise is asked to be so much less than what can be
+/// seen.
 const LEAST: f32 = 1e-11;
 
-/// Reads a map for a picture of `size` pixels, of which `area` is rendered: luminance of an EXR or HDR file as it stands, or a
-/// PNG's or JPEG's code values from 0 to 1. A map of another size and the same shape is interpolated bilinearly.
+/// Reads a map for a picture of `size` pixels, of which `area` is rendered: luminance of an EXR or HDR file as it
+/// stands, or a PNG's or JPEG's code values from 0 to 1. A map of another size and the same shape is interpolated
+/// bilinearly.
 pub(super) fn read(path: &Path, size: (usize, usize), area: Crop) -> Result<Plane> {
     let map = InputPicture::read_values(path)?;
     let (width, height) = (map.width(), map.height());

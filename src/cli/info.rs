@@ -1,4 +1,4 @@
-//! `fechner info FILE`: what a picture or a film holds.
+//! `fechner info FILE`: what a picture or a film holds. It changes nothing.
 
 mod film;
 

@@ -1,4 +1,5 @@
-//! Keeping the film of a render safe: checkpoints while it runs, where it starts from in `start`, and who else watches it in `watch`.
+//! Keeping the film of a render safe: checkpoints while it runs, where it starts from in `start`, and who
+//! else watches it in `watch`.
 
 mod start;
 mod watch;
@@ -33,7 +34,8 @@ const LONG_INTERVAL: Duration = Duration::from_secs(30);
 const LEAST_BATCH: u64 = 1 << 12;
 /// Batches take so many times what it takes to write the film, or all of the time is spent in writing it.
 const WRITES_A_BATCH: f64 = 4.0;
-/// Batches in an interval. With the tracer's own, films that were to be kept every second were kept every 2 to 4.
+/// Batches in an interval, so that films are kept when it ends. Measured with the tracer's own batches: films that are
+/// to be kept every second are kept every 2 to 4.
 const BATCHES_AN_INTERVAL: f64 = 8.0;
 
 /// What was written so far, and how long it took.
@@ -42,7 +44,7 @@ struct History {
     last_chance: Instant,
     /// When what is being traced began to be.
     batch_began: Instant,
-    /// Of the last batch.
+    /// Samples a second in the last batch.
     samples_a_second: Option<f64>,
     longest_wait: Duration,
     longest_write: Duration,
@@ -200,7 +202,8 @@ mod tests {
         read_checkpoint(&film).expect("kept");
     }
 
-    /// Where a film is kept often, a batch is an eighth of the interval, or four times what writing takes; where it is not, the tracer's own.
+    /// Where a film is kept often, a batch is an eighth of the interval, or four times what writing takes; where it
+    /// is not, the tracer's own.
     #[test]
     fn batches_are_short_where_a_film_is_kept_often() {
         let of = |every: Duration| {

@@ -1,5 +1,5 @@
-//! How a picture was shown when it was rendered, as its file says: what `compare`, `threshold` and `tonemap` show is what
-//! the render judged, with its operator and its exposure.
+//! How a picture was shown when it was rendered, as its file says: what `compare`, `threshold` and `tonemap` show is
+//! what the render judged, with its operator and its exposure. Not for files of other programs, which do not say it.
 
 use super::picture::InputPicture;
 use anyhow::Result;
@@ -10,13 +10,14 @@ use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::{self, DEFAULT_OPERATOR, FittedTone, SavedTone, SceneGuide, ToneSettings};
 use std::path::Path;
 
-/// What `tonemap` says of its EXR files, and its value there: they hold light of a display, by a fit that has done its work.
+/// What `tonemap` says of its EXR files, and its value there: they hold light of a display, by a fit that has done its
+/// work.
 pub(super) const LIGHT: &str = "fechner.light";
 pub(super) const OF_DISPLAY: &str = "display";
 
 /// What brings a picture to the display as it was when it was made.
 pub(super) enum KeptTone {
-    /// Of a render.
+    /// The picture of a render, with its tone.
     Rendered(Box<RenderTone>),
     /// Nothing: it is of a display.
     Displayed,
@@ -31,7 +32,7 @@ pub(super) struct RenderTone {
 }
 
 impl KeptTone {
-    /// `None` for files that do not say it.
+    /// The tone that an EXR file keeps; `None` for files that do not say it.
     pub(super) fn of(exr: &ExrImage) -> Option<Self> {
         if text(exr, LIGHT) == Some(OF_DISPLAY) {
             return Some(Self::Displayed);
@@ -93,8 +94,8 @@ pub(super) fn display_not_read(exr: &ExrImage) -> Option<String> {
     is_damaged.then(|| format!("its {} cannot be read, and is not looked at", attribute::DISPLAY))
 }
 
-/// The display that a file was made for: as the file has it, else, of an older or a damaged one, the preset that it names, where that is
-/// still the same.
+/// The display that a file was made for: as the file has it, else, of an older or a damaged one, the preset that it
+/// names, where that is still the same.
 pub(super) fn display_in(exr: &ExrImage) -> Option<Display> {
     if let Some(display) = text(exr, attribute::DISPLAY).and_then(described) {
         return Some(display);
@@ -115,7 +116,8 @@ pub(super) fn first_scene<'p>(pictures: &[(&'p Path, &'p InputPicture)]) -> Opti
     pictures.iter().copied().find(|(_, picture)| picture.holds_scene_light())
 }
 
-/// The operator by which the first of the pictures that holds a scene's light was shown when it was rendered. Says so, or why not.
+/// The operator by which the first of the pictures that holds a scene's light was shown when it was rendered. Says so,
+/// or why not.
 pub(super) fn as_rendered(pictures: &[(&Path, &InputPicture)], viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
     let (path, picture) = first_scene(pictures)?;
     let kept = picture.kept_tone()?;
@@ -139,9 +141,9 @@ pub(super) fn as_rendered(pictures: &[(&Path, &InputPicture)], viewing: &Viewing
     fitted
 }
 
-/// What brings the scene's light of pictures to the display: the operator that was asked for, fitted to the first of them that holds
-/// such light; where none was, as that one was shown when it was rendered; else the default one, fitted to it. `None` for pictures
-/// that are ready for the display.
+/// What brings the scene's light of pictures to the display: the operator that was asked for, fitted to the first of
+/// them that holds such light; where none was, as that one was shown when it was rendered; else the default one, fitted
+/// to it. `None` for pictures that are ready for the display.
 pub(super) fn shown_by(
     asked: Option<&str>,
     pictures: &[(&Path, &InputPicture)],

@@ -36,7 +36,7 @@ impl MapLayer {
 }
 
 impl MapTarget {
-    /// From `LAYER=FILE`.
+    /// Reads `LAYER=FILE`.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
         let wrong = || {
             let names = MapLayer::ALL.map(|(name, _)| name).join(", ");

@@ -1,4 +1,4 @@
-//! The command line.
+//! The command line: one module for each subcommand, and what several of them share.
 
 mod animate;
 mod bench;
@@ -98,8 +98,8 @@ fn parsed() -> anyhow::Result<ControlFlow<ExitCode, CommandLine>> {
     }
 }
 
-/// Runs what the arguments ask for. Exit status 0: done; 1: `compare` sees a difference; 2: bad input or a failed write;
-/// 75: a render or a farm's work was stopped by a signal, or has to wait, and should be called again.
+/// Runs what the arguments ask for. Exit status 0: done; 1: `compare` sees a difference; 2: bad input or a failed
+/// write; 75: a render or a farm's work was stopped by a signal, or has to wait, and should be called again.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
     signals::outlive_file_limits();
     let arguments = match parsed()? {

@@ -1,4 +1,5 @@
-//! Pictures of any renderer as the input of `compare`, `threshold` and `tonemap`, as frames of a video, and as maps of importance.
+//! Pictures of any renderer as the input of `compare`, `threshold` and `tonemap`, as frames of a video, and as maps of
+//! importance.
 
 mod from_file;
 
@@ -25,7 +26,8 @@ pub(super) struct InputPicture {
     made_for: Option<Display>,
     /// How it was shown when it was rendered, where its file says so.
     kept_tone: Option<KeptTone>,
-    /// How much of each pixel it covers, 0 to 1, where an EXR file leaves some of any uncovered. Its values are multiplied by it.
+    /// How much of each pixel it covers, 0 to 1, where an EXR file leaves some of any uncovered. Its values are
+    /// multiplied by it.
     alpha: Option<Vec<f32>>,
     /// Whether an EXR file has light and an alpha of 0 all over, as passes have it, which is not looked at.
     is_pass: bool,
@@ -65,8 +67,8 @@ enum Content {
 /// What code values mean.
 #[derive(Clone, Copy, PartialEq)]
 enum Codes {
-    /// Light of the display between its black and its white, under the curve of sRGB: colour management brings it to a display
-    /// of any other transfer function.
+    /// Light of the display between its black and its white, under the curve of sRGB: colour management brings it to a
+    /// display of any other transfer function.
     Srgb(Primaries),
     /// The same light as it is.
     Linear(Primaries),
@@ -77,8 +79,8 @@ enum Codes {
 }
 
 impl InputPicture {
-    /// The viewing of this picture, whose pixels may be oblong: its lines are as dense as the display's and its columns closer
-    /// together or wider apart, as players stretch them.
+    /// The viewing of this picture, whose pixels may be oblong: its lines are as dense as the display's and its columns
+    /// closer together or wider apart, as players stretch them.
     pub(super) fn viewed(&self, viewing: &Viewing) -> Result<Viewing> {
         let mut viewing = viewing.clone();
         viewing.display.pixels_per_degree /= self.pixel_aspect_ratio;
@@ -208,7 +210,7 @@ impl InputPicture {
         self.displayed_rgb_over(Ground::Black, tone, viewing)
     }
 
-    /// The same with the display's black or white behind it.
+    /// Linear RGB in cd/m² that the display sends to the eye, with its black or white behind the picture.
     pub(super) fn displayed_rgb_over(
         &self,
         ground: Ground,
@@ -229,7 +231,8 @@ impl InputPicture {
     /// Linear display RGB, 0 the display's black and 1 its white; `map` brings a scene there.
     fn relative_rgb(&self, tone: Option<&dyn FittedTone>, display: &Display, map: Mapping) -> Vec<[f32; 3]> {
         match (self.scene_rgb_cd_m2(), tone, &self.alpha) {
-            // An operator shows what covers a pixel, as in the PNG of a render: of light times alpha it would make another thing.
+            // An operator shows what covers a pixel, as in the PNG of a render: of light times alpha it would make
+            // another thing.
             (Some(scene), Some(tone), Some(alpha)) => Covered::of(tone, map, self.width, &scene, alpha).premultiplied(),
             (Some(scene), Some(tone), None) => map(tone, self.width, &scene),
             _ => self.before_black(self.decoded(display)),
@@ -244,7 +247,7 @@ impl InputPicture {
         light
     }
 
-    /// The same of codes that are ready for the display.
+    /// Linear display RGB of codes that are ready for the display.
     fn decoded(&self, display: &Display) -> Vec<[f32; 3]> {
         let linear = |decode: &dyn Fn(f64) -> f64| -> Vec<[f32; 3]> {
             self.rgb.iter().map(|rgb| rgb.map(|code| decode(f64::from(code)) as f32)).collect()
@@ -299,8 +302,9 @@ impl InputPicture {
         self.rgb.iter().flat_map(|rgb| rgb.map(byte)).collect()
     }
 
-    /// Luminance in cd/m² that the display sends to the eye, of the colours that it shows: those that it clips too. Scenes are brought there
-    /// with the operator's loss of acuity, or by `map_pixels` without it: for an eye behind it.
+    /// Luminance in cd/m² that the display sends to the eye, of the colours that it shows: those that it clips too.
+    /// Scenes are brought there with the operator's loss of acuity, or by `map_pixels` without it: for an eye behind
+    /// it.
     pub(super) fn displayed(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing, map: Mapping) -> Plane {
         self.luminance_of(&self.relative_rgb(tone, &viewing.display, map), &viewing.display)
     }
@@ -329,7 +333,8 @@ fn in_cd_m2(relative: Vec<[f32; 3]>, display: &Display) -> Vec<[f32; 3]> {
     relative.into_iter().map(|rgb| rgb.map(cd_m2)).collect()
 }
 
-/// Light of other primaries, 0 to 1, in those of Rec.709: what they do not reach is brought in at the luminance that it has.
+/// Light of other primaries, 0 to 1, in those of Rec.709: what they do not reach is brought in at the luminance that it
+/// has.
 fn in_rec709(light: Vec<[f32; 3]>, primaries: &Primaries) -> Vec<[f32; 3]> {
     let Some(matrix) = primaries.to_other(&Primaries::REC709) else { return light };
     let inside = |rgb: [f32; 3]| gamut::fit_into_display(apply(&matrix, rgb.map(f64::from)).map(|value| value as f32));
@@ -341,7 +346,8 @@ mod tests {
     use super::*;
     use fechner_perception::tone::map_pixels;
 
-    /// P3's and Rec.2020's primaries under the curve of sRGB: with their negative channels cut off they were 14 to 35 % too bright.
+    /// P3's and Rec.2020's primaries under the curve of sRGB. Regression: with their negative channels cut off they
+    /// were 14 to 35 % too bright.
     #[test]
     fn colours_of_wider_primaries_keep_their_luminance() {
         for primaries in [Primaries::DISPLAY_P3, Primaries::REC2020] {
@@ -377,7 +383,8 @@ mod tests {
         light.iter().enumerate().for_each(|(x, rgb)| close(displayed.get(x, 0), cd_m2(luminance(*rgb))));
     }
 
-    /// Codes of 16 bits without a tag have an alpha as those of sRGB, and lie before black: with black they were seen in full light.
+    /// Codes of 16 bits without a tag have an alpha as those of sRGB, and lie before black. Regression: with black
+    /// they were seen in full light.
     #[test]
     fn codes_of_any_curve_lie_before_black() {
         let folder = tempfile::tempdir().expect("a folder");

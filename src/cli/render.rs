@@ -1,4 +1,4 @@
-//! `fechner render`: a scene file in, a picture out.
+//! `fechner render`: a scene file in, a picture out. What is rendered and when it ends is left to `job`.
 
 use super::CALL_AGAIN;
 use super::console::Console;
@@ -85,7 +85,8 @@ fn render_and_write(arguments: &RenderArguments, format: PictureFormat) -> anyho
     let Prepared { scene, trace, .. } = &prepared;
     let origin = || Origin { scene_name: arguments.job.scene_name(), ..Origin::of(scene, trace) };
     let origin = arguments.checkpoint.is_wanted().then(origin);
-    // From here on SIGINT, SIGTERM and SIGHUP end the render with the picture so far; one that comes seconds later ends the program.
+    // From here on SIGINT, SIGTERM and SIGHUP end the render with the picture so far; one that comes seconds later ends
+    // the program.
     let stop = listen(|| {})?;
     let seconds_fitting = seconds_to_fit(arguments, &mut prepared, origin.as_ref());
     let Prepared { scene, trace, record, settings, .. } = prepared;
@@ -114,7 +115,8 @@ fn render_and_write(arguments: &RenderArguments, format: PictureFormat) -> anyho
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
 }
 
-/// Fits tone to the whole of which the picture is a part, as the film of `origin` was fitted if it is kept; what that took by the clock.
+/// Fits tone to the whole of which the picture is a part, as the film of `origin` was fitted if it is kept;
+/// what that took by the clock.
 fn seconds_to_fit(arguments: &RenderArguments, prepared: &mut Prepared, origin: Option<&Origin>) -> f64 {
     let started = Instant::now();
     let kept_fit = origin.and_then(|origin| arguments.checkpoint.kept_fit(origin, &prepared.record));
@@ -211,8 +213,8 @@ fn all_written(files: impl IntoIterator<Item = anyhow::Result<()>>) -> anyhow::R
     if failures.is_empty() { Ok(()) } else { bail!(failures.join("; ")) }
 }
 
-/// Writes a picture that cannot be where it should into a new folder among temporary files, and says so: its samples took long.
-/// Others may write there too, and must not know the folder's name beforehand.
+/// Writes a picture that cannot be where it should into a new folder among temporary files, and says so: its samples
+/// took long. Others may write there too, and must not know the folder's name beforehand.
 fn kept_elsewhere(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>, error: anyhow::Error) -> anyhow::Error {
     // Names may be longer where it should be than among temporary files.
     let name = output::shortened_name(path.file_name().unwrap_or(OsStr::new("picture")));
@@ -255,7 +257,8 @@ pub(super) fn write_picture(
 mod tests {
     use super::*;
 
-    /// One that was too long for its folder was too long for the other as well, and the picture was lost.
+    /// Regression: a name that was too long for its folder was too long for the other as well, and the picture was
+    /// lost.
     #[test]
     fn a_picture_of_a_long_name_is_kept_elsewhere() {
         let long = PathBuf::from(format!("{}.exr", "w".repeat(252)));

@@ -1,4 +1,4 @@
-//! Arguments that say who looks at what.
+//! Arguments that say who looks at what. What they see is left to the perception crate.
 
 use super::kept_tone::first_scene;
 use super::numbers::{parse_positive, parse_unit};
@@ -74,7 +74,8 @@ impl SeeingArguments {
         display_file(self.display.as_deref())
     }
 
-    /// Says which pictures hold light of a display, and which arguments change nothing of pictures that are all ready for it.
+    /// Says which pictures hold light of a display, and which arguments change nothing of pictures that are all ready
+    /// for it.
     pub(super) fn note_what_is_ready(&self, operator: Option<&str>, pictures: &[(&Path, &InputPicture)]) {
         for (path, _) in pictures.iter().filter(|(_, picture)| picture.holds_emitted_light()) {
             say!("note: {} holds light of a display, and is shown as it is", path.display());
@@ -132,8 +133,8 @@ pub(super) fn viewing_of_render(display: &str, csf_area_deg2: Option<f64>) -> Re
     Ok(viewing)
 }
 
-/// The display that was asked for, else the one that the first of the pictures that says so was made for, else a likely one: what a file
-/// says goes before what another's codes only suggest, whichever is named first.
+/// The display that was asked for, else the one that the first of the pictures that says so was made for, else a likely
+/// one: what a file says goes before what another's codes only suggest, whichever is named first.
 pub(super) fn display_of(asked: Option<&str>, pictures: &[(&Path, &InputPicture)]) -> Result<Display> {
     if let Some(name) = asked {
         return find_display(name);
@@ -188,7 +189,7 @@ pub(super) fn operator_values() -> PossibleValuesParser {
     PossibleValuesParser::new(named_operators())
 }
 
-/// The same, and "all".
+/// Names and initials of tone operators, and "all".
 pub(super) fn operator_values_or_all() -> PossibleValuesParser {
     PossibleValuesParser::new(named_operators().chain([PossibleValue::new("all")]))
 }
@@ -204,7 +205,7 @@ fn named_operators() -> impl Iterator<Item = PossibleValue> {
 mod tests {
     use super::*;
 
-    /// It was "display file d.toml: display file: TOML parse error at line 2, column 6; …".
+    /// Regression: the message was "display file d.toml: display file: TOML parse error at line 2, column 6; …".
     #[test]
     fn a_wrong_display_file_is_named_once_and_by_its_line() {
         let said = |text: &str| in_display_file("d.toml", Display::from_toml(text).expect_err(text)).to_string();

@@ -1,4 +1,5 @@
-//! Camera and surroundings from the command line, for scenes that lack them or have the wrong ones.
+//! Camera and surroundings from the command line, for scenes that lack them or have the wrong ones. What they say
+//! stands in place of the file's.
 
 use super::job::Size;
 use super::numbers::whole;
@@ -100,8 +101,8 @@ fn parse_look_at(text: &str) -> Result<LookAt, String> {
 }
 
 impl LookAt {
-    /// The scene's camera, lens and projection and all, moved there, at rest and focused on the point looked at. A field of view that
-    /// is told is that of a central projection, pixels square.
+    /// The scene's camera, lens and projection and all, moved there, at rest and focused on the point looked at. A
+    /// field of view that is told is that of a central projection, pixels square.
     fn camera(self, own: &Camera, forward: Vec3) -> Camera {
         let up = if forward.cross(Vec3::Y).length() < 1e-3 { Vec3::NEG_Z } else { Vec3::Y };
         let focus_distance = self.from.distance(self.to);

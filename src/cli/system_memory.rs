@@ -1,4 +1,4 @@
-//! What Linux says of memory; `None` on other systems.
+//! Asks Linux about memory; `None` on other systems.
 
 /// Memory that is free.
 pub(super) fn available_bytes() -> Option<u64> {

@@ -1,4 +1,5 @@
-//! The files that a command reads and writes.
+//! Checks the files that a command reads and writes, before it does either: that none is another, and that names can be
+//! written.
 
 use anyhow::bail;
 use fechner::output::{check_name, folder_of, target_of};
@@ -9,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// A file, where there is one, with the option or words that name it.
 pub(super) type Named<'a> = (&'a str, Option<&'a Path>);
 
-/// Refuses to write in the place of what is read, or one file for two purposes: a reference or a scene is lost by that. Refuses names that
-/// no file can have as well, of frames to come too.
+/// Refuses to write in the place of what is read, or one file for two purposes: a reference or a scene is lost by that.
+/// Refuses names that no file can have as well, of frames to come too.
 pub(super) fn check_kept(read: &[Named], written: &[Named]) -> anyhow::Result<()> {
     written.iter().filter_map(|&(_, path)| path).try_for_each(check_name)?;
     check_distinct(written)?;
@@ -24,8 +25,8 @@ pub(super) fn check_kept(read: &[Named], written: &[Named]) -> anyhow::Result<()
     Ok(())
 }
 
-/// Refuses to write in the place of a file that the scene is made of: its meshes, pictures and included files, which are known once it is
-/// loaded.
+/// Refuses to write in the place of a file that the scene is made of: its meshes, pictures and included files, which
+/// are known once it is loaded.
 pub(super) fn check_scene_kept(written: &[Named]) -> anyhow::Result<()> {
     for (option, path) in written.iter().filter_map(|&(option, path)| Some((option, path?))) {
         if was_read(path) {
@@ -40,8 +41,8 @@ pub(super) fn display_file(display: Option<&str>) -> Named<'_> {
     ("the display", display.filter(|name| name.ends_with(".toml")).map(Path::new))
 }
 
-/// Refuses one file for two purposes, each given with the option or words that name it: what is written later would take the place of
-/// what was written before.
+/// Refuses one file for two purposes, each given with the option or words that name it: what is written later would
+/// take the place of what was written before.
 pub(super) fn check_distinct(files: &[Named]) -> anyhow::Result<()> {
     let mut purposes = HashMap::new();
     for (what, path) in files.iter().filter_map(|&(what, path)| Some((what, path?))) {
@@ -76,7 +77,8 @@ mod tests {
         }
     }
 
-    /// Before anything is at their end: two links were two files, and a picture took the film's place.
+    /// Links are one file before anything is at their end, too. Regression: two links were two files, and a
+    /// picture took the film's place.
     #[cfg(unix)]
     #[test]
     fn links_to_one_file_are_one_file() {

@@ -1,4 +1,4 @@
-//! `--tev`: the picture and its layers in tev while they are made.
+//! `--tev`: the picture and its layers in tev while they are made. What tev is sent is left to `fechner::preview`.
 
 use anyhow::Context;
 use clap::Args;
@@ -63,12 +63,12 @@ impl Showing {
         self.moving.lock().unpoisoned()
     }
 
-    /// After each look.
+    /// Keeps what a look saw. Called after each look.
     pub(super) fn judged(&self, judgement: &Judgement) {
         self.moving().looked = Some(Looked::of(judgement));
     }
 
-    /// Between batches.
+    /// Shows the picture if it is time to. Called between batches.
     pub(super) fn between_batches(&self, state: &RenderState) {
         let mut moving = self.moving();
         if moving.tev.is_due() {
@@ -76,7 +76,7 @@ impl Showing {
         }
     }
 
-    /// At the end.
+    /// Shows the finished picture. Called at the end.
     pub(super) fn ended(&self, state: &RenderState) {
         self.show(&mut self.moving(), state, Stage::AtRest);
     }

@@ -1,5 +1,5 @@
-//! `fechner threshold`: how much noise may stay in a picture, and how visible the noise is that it has; in `made_of` what a picture has of its
-//! halves, in `motion` how what it shows moves.
+//! `fechner threshold`: how much noise may stay in a picture, and how visible the noise is that it has; in `made_of`
+//! what a picture has of its halves, in `motion` how what it shows moves.
 
 mod made_of;
 mod motion;
@@ -119,7 +119,7 @@ struct Asked {
 struct Found {
     threshold_cd_m2: Plane,
     adaptation_cd_m2: Plane,
-    /// Of the halves' noise.
+    /// Visibility of the halves' noise.
     visibility: Option<Plane>,
 }
 
@@ -159,8 +159,9 @@ impl Asked {
         Ok(Self { guide, halves, made_of, display, viewing, model, csf, fitted, motion })
     }
 
-    /// Noise goes through the loss of acuity that the operator shows, and so does what masks it: by the contrast sensitivity, so that
-    /// neither the guide nor the halves have it already, or, where the model asks for none, by the pictures.
+    /// Noise goes through the loss of acuity that the operator shows, and so does what masks it: by the
+    /// contrast sensitivity, so that neither the guide nor the halves have it already, or, where the model asks
+    /// for none, by the pictures.
     fn mapping(&self) -> Mapping {
         if self.model.knows_csf() { map_pixels } else { map_picture }
     }
@@ -198,8 +199,8 @@ impl Asked {
         picture.displayed_rgb_by(self.fitted.as_deref(), &self.viewing, self.mapping())
     }
 
-    /// How visible the noise of two halves is: by the model's own thresholds of luminance, and by those of colour where it is the default,
-    /// which is the only one that is made for them.
+    /// How visible the noise of two halves is: by the model's own thresholds of luminance, and by those of colour where
+    /// it is the default, which is the only one that is made for them.
     fn noise_visibility(&self, noise: &HalfDifference, inputs: &ModelInputs<'_>) -> Result<Plane> {
         let of_luminance = self.model.measured_visibility(inputs, &noise.luminance)?;
         if self.model.name() != model::DEFAULT {

@@ -382,8 +382,8 @@ impl Eye {
         })
     }
 
-    /// The state in which the next frame is seen, so many frames after the last. The first one is seen as it appears; between frames
-    /// the light changes evenly.
+    /// The state in which the next frame is seen, so many frames after the last. The first one is seen as it appears;
+    /// between frames the light changes evenly.
     fn look_at(&mut self, goal: Goal, frames: u64) -> AdaptationState {
         let state = match self.state {
             None => AdaptationState::adapted_to(goal, &self.kinetics),

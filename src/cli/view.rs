@@ -1,4 +1,4 @@
-//! `fechner view`: a render in a browser, while it is made.
+//! `fechner view`: a render in a browser, while it is made. What its page shows is left to `fechner::preview`.
 
 use super::in_a_line;
 use super::job::{JobArguments, Prepared};
@@ -126,7 +126,8 @@ fn door_of(listener: &TcpListener) -> anyhow::Result<(SocketAddr, String)> {
     Ok((address, preview::random_token().context("the system gives no random numbers for a token")?))
 }
 
-/// Where somebody who listens on all addresses of this machine is found: at the one that others see it by, or else at its own.
+/// Where somebody who listens on all addresses of this machine is found: at the one that others see it by, or else at
+/// its own.
 fn reachable(listener: SocketAddr) -> SocketAddr {
     // Nothing is sent: the system says which address it would send from to one of documentation's.
     let (any, elsewhere, own) = match listener.ip() {

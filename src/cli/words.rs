@@ -1,10 +1,10 @@
-//! Errors and figures as people read them.
+//! Puts errors and figures as people read them.
 
 /// What every figure of the perception model has to be read with.
 pub(super) const OF_THE_MODEL: &str = "model-predicted; calibrated on gratings, not on renderings";
 
-/// An error and its causes in one line. A cause that its effect's words end with, as those of many libraries do, is not said again;
-/// lines of a file that a parser quotes are left out, since its words name line and column.
+/// An error and its causes in one line. A cause that its effect's words end with, as those of many libraries do, is not
+/// said again; lines of a file that a parser quotes are left out, since its words name line and column.
 pub(crate) fn in_a_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain().map(|cause| without_quotes(&cause.to_string())) {
@@ -16,8 +16,8 @@ pub(crate) fn in_a_line(error: &anyhow::Error) -> String {
     line
 }
 
-/// What is wrong with the arguments, in one line: the message and its hint, without the usage and where to find help. That a file may
-/// be called `--name` is no hint for who mistypes an argument.
+/// What is wrong with the arguments, in one line: the message and its hint, without the usage and where to find help.
+/// That a file may be called `--name` is no hint for who mistypes an argument.
 pub(super) fn in_a_line_of_arguments(error: &clap::Error) -> String {
     let is_of_files = |line: &&str| line.starts_with("tip: to pass '-") && line.contains("as a value, use '-- ");
     let text = error.to_string();
@@ -51,7 +51,8 @@ pub(super) fn samples_in_words(samples: u64) -> String {
     }
 }
 
-/// Two digits after the point, three of a small number that count, without a tail of zeros; as a power of ten where that is long.
+/// A number with two digits after the point, three of a small number that count, without a tail of zeros; as a power
+/// of ten where that is long.
 pub(super) fn rounded(value: f64) -> String {
     /// Powers of ten within which digits can be read.
     const READABLE: std::ops::Range<f64> = -9.0..15.0;

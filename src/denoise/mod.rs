@@ -1,8 +1,8 @@
 //! Denoisers of the output picture: our own joint filter, and Intel's where it is installed.
 //!
-//! The raw mean stays what it is in the film, in checkpoints and in the EXR's `raw` layer: a denoised picture is made from a
-//! copy. What may be seen of its error is judged by `fechner_perception::denoised`. Not for animation as such: each frame is
-//! denoised by itself.
+//! The raw mean stays what it is in the film, in checkpoints and in the EXR's `raw` layer: a denoised picture is made
+//! from a copy. What may be seen of its error is judged by `fechner_perception::denoised`. Not for animation as such:
+//! each frame is denoised by itself.
 
 mod builtin;
 mod of_film;
@@ -24,7 +24,7 @@ pub enum DenoiserKind {
 }
 
 impl DenoiserKind {
-    /// As `--denoise` has it.
+    /// Name of the denoiser, as `--denoise` has it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Builtin => "builtin",
@@ -51,9 +51,10 @@ pub struct SurfaceGuides {
     pub height: usize,
     /// Albedo of the first surface, 0..1.
     pub albedo: Vec<[f32; 3]>,
-    /// Its normal; 0 where there is none.
+    /// Normal of the first surface; 0 where there is none.
     pub normal: Vec<[f32; 3]>,
-    /// Its distance, scene units; what is not there counts as 0 in a film's mean, and is infinitely far where it is not finite.
+    /// Distance of the first surface, scene units; what is not there counts as 0 in a film's mean, and is infinitely
+    /// far where it is not finite.
     pub depth: Vec<f32>,
     /// Whether something that is seen there shines by itself.
     pub shines: Vec<bool>,
@@ -84,7 +85,7 @@ pub struct NoisyPicture<'a> {
     pub rgb: &'a [[f32; 3]],
     /// Variance of the mean's luminance, (cd/m²)².
     pub variance: &'a Plane,
-    /// Of the same denoiser.
+    /// Guides that the same denoiser has prepared.
     pub guides: &'a PreparedGuides,
 }
 
@@ -116,8 +117,9 @@ impl Denoiser {
         }
     }
 
-    /// Makes guides ready, once for all pictures that they guide. Open Image Denoise is told to trust them, and while they are the
-    /// mean of few samples gets them denoised, each by itself: worth up to 0.6 JOD (`benches/results/denoising.md`).
+    /// Makes guides ready, once for all pictures that they guide. Open Image Denoise is told to trust them, and while
+    /// they are the mean of few samples gets them denoised, each by itself: worth up to 0.6 JOD
+    /// (`benches/results/denoising.md`).
     ///
     /// # Errors
     /// [`OidnError::Failed`] where the library fails.

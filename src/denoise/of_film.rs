@@ -1,7 +1,7 @@
 //! The film's picture and both of its halves, denoised.
 //!
-//! Of lamps that are seen, what is far above the rest of the picture is left out and added again afterwards, each half's own to
-//! each half: beside light that is a hundred times as strong a denoiser draws halos.
+//! Of lamps that are seen, what is far above the rest of the picture is left out and added again afterwards, each
+//! half's own to each half: beside light that is a hundred times as strong a denoiser draws halos.
 
 use super::{Denoiser, NoisyPicture, OidnError, SurfaceGuides};
 use crate::film::{Estimate, Film, HalfPixel, Halves, PixelGuide};
@@ -15,8 +15,8 @@ use glam::Vec3;
 pub struct DenoisedFilm {
     /// The mean of all samples, denoised: the picture.
     pub rgb_cd_m2: Vec<[f32; 3]>,
-    /// Each half's mean by itself, denoised with what its own samples have met: their difference is the noise that denoising left, and
-    /// that which guides brought in.
+    /// The halves' means, each by itself, denoised with what its own samples have met: their difference is the noise
+    /// that denoising left, and that which guides brought in.
     pub halves_rgb_cd_m2: [Vec<[f32; 3]>; 2],
     /// What shines by itself above this luminance, cd/m², was left as it was sampled.
     pub lamps_from_cd_m2: f32,
@@ -69,7 +69,8 @@ fn told_variance(film: &Film, estimate: &Estimate) -> Plane {
     film.plane(|pixel| {
         let own = own[pixel];
         match film.halves(pixel) {
-            // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ by.
+            // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ
+            // by.
             Halves::Both(_) => 0.5 * (own + half_difference[pixel].powi(2)),
             Halves::Only(only) if only.samples > 1 => own,
             Halves::Only(_) => VARIANCE_OF_A_LONE_SAMPLE * luminance[pixel].powi(2),
@@ -93,15 +94,16 @@ fn surface_guides(film: &Film, share: f64, at: impl Fn(usize) -> PixelGuide) -> 
     }
 }
 
-/// Takes away what a denoiser spread into pixels that hold nothing. Behind them may stand another picture, to which it would be added.
+/// Takes away what a denoiser spread into pixels that hold nothing. Behind them may stand another picture, to which it
+/// would be added.
 pub fn leave_the_void_dark(film: &Film, rgb: &mut [[f32; 3]]) {
     let void = rgb.iter_mut().enumerate().filter(|(pixel, _)| film.is_void(*pixel));
     void.for_each(|(_, rgb)| *rgb = [0.0; 3]);
 }
 
-/// What is seen to shine by itself is shown to the denoiser no brighter than so many times what the rest of the picture is on
-/// average: mostly above display white, so that edges are still smoothed where they are seen. 5 and 20 are as good
-/// (`benches/results/denoising.md`).
+/// What is seen to shine by itself is shown to the denoiser no brighter than so many times what the rest of the picture
+/// is on average: mostly above display white, so that edges are still smoothed where they are seen. 5 and 20 are as
+/// good (`benches/results/denoising.md`).
 const TIMES_THE_REST: f32 = 10.0;
 
 /// The most luminance that the denoiser is shown of what shines by itself, cd/m².
@@ -144,8 +146,8 @@ mod tests {
         PathSample { radiance, first_hit: FirstHit { albedo, ..FirstHit::WALL }, rays: 1 }
     }
 
-    /// A wall of radiance 1 with noise, and before it a lamp two pixels wide that is 10000 times as bright, whose edges cover pixels
-    /// by half.
+    /// A wall of radiance 1 with noise, and before it a lamp two pixels wide that is 10000 times as bright, whose
+    /// edges cover pixels by half.
     fn wall_and_lamp() -> Film {
         let mut drawn = 0;
         let mut random = || {
@@ -173,8 +175,9 @@ mod tests {
         })
     }
 
-    /// Light by which a black and white pattern, finer than pixels, is seen: all noise is in what is met first, and guides carry it into the
-    /// picture. Shared by both halves they would hide it from their difference, which then was 0.08 of the error.
+    /// Light by which a black and white pattern, finer than pixels, is seen: all noise is in what is met first, and
+    /// guides carry it into the picture. Regression: guides that both halves shared hid it from their difference,
+    /// which was 0.08 of the error.
     #[test]
     fn noise_of_the_guides_is_in_the_halves_difference() {
         let film = film_of(8, |pixel, half, index| {
@@ -237,7 +240,8 @@ mod tests {
         }
     }
 
-    /// The wall beside the lamp stays a wall, and of the lamp's light nothing is lost. Open Image Denoise where it is installed.
+    /// The wall beside the lamp stays a wall, and of the lamp's light nothing is lost. Open Image Denoise where it is
+    /// installed.
     #[test]
     fn lamps_have_no_halos() {
         let film = wall_and_lamp();

@@ -1,4 +1,4 @@
-//! What headers say besides the pixels' layout.
+//! Reads what headers say besides the pixels' layout.
 
 use crate::output::{Attribute, FRAMES_PER_SECOND, PartOf};
 use ::exr::meta::attribute::{AttributeValue, Text};
@@ -11,7 +11,8 @@ pub(super) const COLOR_INTEROP_ID: &str = "colorInteropID";
 /// The flag of SMPTE ST 2065-4, whose files hold ACES 2065-1.
 const ACES_CONTAINER: &str = "acesImageContainerFlag";
 
-/// Primaries and white of R, G and B: as chromaticities, else by the name of a linear colour space, else as those of an ACES container.
+/// Primaries and white of R, G and B: as chromaticities, else by the name of a linear colour space, else as
+/// those of an ACES container.
 pub(super) fn primaries(header: &Header) -> Option<Primaries> {
     let point = |Vec2(x, y): Vec2<f32>| [f64::from(x), f64::from(y)];
     let said = header.shared_attributes.chromaticities.map(|c| Primaries {

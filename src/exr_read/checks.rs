@@ -1,4 +1,4 @@
-//! What a header claims, held against the file's length and a limit on memory.
+//! What a header claims, held against the file's length and a limit on memory. No pixel is looked at.
 
 use super::wanted::Wanted;
 use super::{ExrReadError, MEMORY_LIMIT_BYTES, layout};

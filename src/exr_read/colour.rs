@@ -15,19 +15,21 @@ pub struct ScenePicture {
     pub width: u32,
     /// Height of the display window in pixels.
     pub height: u32,
-    /// Linear Rec.709 RGB in the file's unit, finite, row-major; may be negative for colours outside Rec.709. Black where
-    /// the file has no pixels.
+    /// Linear Rec.709 RGB in the file's unit, finite, row-major; may be negative for colours outside Rec.709. Black
+    /// where the file has no pixels.
     pub rgb: Vec<[f32; 3]>,
     /// What was done to it, a line each, for whoever should know.
     pub notes: Vec<String>,
 }
 
 impl ExrImage {
-    /// The picture in linear Rec.709 RGB over the display window; `None` where there is neither R, G and B nor luminance.
+    /// The picture in linear Rec.709 RGB over the display window; `None` where there is neither R, G and B nor
+    /// luminance.
     ///
-    /// `find` finds a channel R, G or B by its last name (renderers prefix layers). Without them X, Y and Z of the layer that has luminance
-    /// ([`luminance_layer`]) are CIE XYZ. Chromaticities are honoured: colours stay what they are, white included. Not finite values become 0 (NaN,
-    /// −∞) or (∞) the largest finite value of the picture, at least 65504: what overflows a half is a lamp or the sun, brighter than all else.
+    /// `find` finds a channel R, G or B by its last name (renderers prefix layers). Without them X, Y and Z of the
+    /// layer that has luminance ([`luminance_layer`]) are CIE XYZ. Chromaticities are honoured: colours stay what they
+    /// are, white included. Not finite values become 0 (NaN, −∞) or (∞) the largest finite value of the picture, at
+    /// least 65504: what overflows a half is a lamp or the sun, brighter than all else.
     pub fn scene_picture<'a>(&'a self, find: impl Fn(&'a Self, &str) -> Option<&'a [f32]>) -> Option<ScenePicture> {
         let mut notes = Vec::new();
         let mut primaries = self.chromaticities.unwrap_or(Primaries::REC709);
@@ -75,8 +77,8 @@ impl ExrImage {
         Some(ScenePicture { width, height, rgb, notes })
     }
 
-    /// What to say of a named colour space that is not linear light of known primaries. Data has no colours, and other parts of a file may be
-    /// some.
+    /// What to say of a named colour space that is not linear light of known primaries. Data has no colours, and other
+    /// parts of a file may be some.
     fn colour_space_not_heeded(&self) -> Option<String> {
         let Some(Attribute::Text(id)) = self.attribute(COLOR_INTEROP_ID) else { return None };
         let is_heeded = linear_primaries(id).is_some() || ["data", "unknown"].contains(&id.as_str());
@@ -122,7 +124,8 @@ const LARGEST_HALF: f32 = 65504.0;
 /// Values that were not finite.
 pub(crate) struct Replaced {
     count: usize,
-    /// What stands for infinity: the largest value of the picture or of a half. NaN and −∞ are no light at all, and became 0.
+    /// What stands for infinity: the largest value of the picture or of a half. NaN and −∞ are no light at all, and
+    /// become 0.
     infinity: f32,
 }
 
@@ -147,8 +150,8 @@ pub(crate) fn make_finite(channels: &mut [&mut [f32]]) -> Option<Replaced> {
     Some(Replaced { count, infinity })
 }
 
-/// What to say of pixels that take light away, which none is seen to do: black is shown. Not of colours outside Rec.709, which have negative channels and
-/// a luminance above 0.
+/// What to say of pixels that take light away, which none is seen to do: black is shown. Not of colours outside
+/// Rec.709, which have negative channels and a luminance above 0.
 pub fn negative_light<'a>(rgb: impl IntoIterator<Item = &'a [f32; 3]>) -> Option<String> {
     // What other primaries than the file's make of black and of colours at the edge of what is seen.
     const ROUNDING: f32 = 1e-5;

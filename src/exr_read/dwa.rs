@@ -1,7 +1,7 @@
 //! What blocks of DWAA and DWAB claim to unpack to, checked before they are unpacked.
 //!
-//! The `exr` crate takes the memory that such a block asks for in its first words, whatever that is, and a system that has not so much
-//! ends the program.
+//! The `exr` crate takes the memory that such a block asks for in its first words, whatever that is, and a system that
+//! has not so much ends the program.
 
 use super::ExrReadError;
 use super::checks::guarded;
@@ -14,7 +14,8 @@ use std::path::Path;
 
 /// Counts at the start of a block: its version, nine sizes and numbers, and how it is coded.
 const COUNTS: usize = 11;
-/// Where those stand that say how much is unpacked: bytes of what is not transformed, of runs before and after, coefficients and means.
+/// Where those stand that say how much is unpacked: bytes of what is not transformed, of runs before and
+/// after, coefficients and means.
 pub(super) const UNPACKED: [usize; 5] = [1, 6, 7, 8, 9];
 
 /// Refuses a file one of whose blocks claims more than the pixels that it stands for.

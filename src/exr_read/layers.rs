@@ -1,4 +1,4 @@
-//! Which layer of another program's EXR file is its picture.
+//! Finds which layer of another program's EXR file is its picture, by names alone.
 
 use super::{ExrImage, layer_and_part};
 use std::collections::BTreeSet;
@@ -49,9 +49,10 @@ const BLENDER_PASSES: [&str; 14] = [
 
 /// The layer that is taken for the picture.
 pub struct PictureLayer<'a> {
-    /// Its name; empty of the root.
+    /// Name of the layer; empty for the root.
     pub name: &'a str,
-    /// Those that could be meant as well, it among them; empty where its name alone says that it is the picture, or no other is one.
+    /// Those that could be meant as well, it among them; empty where its name alone says that it is the
+    /// picture, or no other is one.
     of: Vec<&'a str>,
 }
 
@@ -96,8 +97,8 @@ impl ExrImage {
 }
 
 /// The root if it has `R`, `G` and `B`, else a layer a part of whose name, between dots, is what a finished picture is
-/// called (`RenderLayer.Combined.R`), else the first layer; auxiliaries only where a part of their name says picture and nothing
-/// else is there.
+/// called (`RenderLayer.Combined.R`), else the first layer; auxiliaries only where a part of their name says picture
+/// and nothing else is there.
 #[must_use]
 pub fn picture_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
     let (auxiliary, others): (Vec<&str>, Vec<&str>) =
@@ -105,8 +106,8 @@ pub fn picture_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
     PictureLayer::named(&others).or_else(|| PictureLayer::among(others)).or_else(|| PictureLayer::named(&auxiliary))
 }
 
-/// The layer of a picture of luminance, with chroma or as CIE XYZ or alone: the root if it has `Y`, else a layer that is called as a
-/// finished picture is. Any other layer may have a `Y` that is no light, as a direction's is.
+/// The layer of a picture of luminance, with chroma or as CIE XYZ or alone: the root if it has `Y`, else a layer that
+/// is called as a finished picture is. Any other layer may have a `Y` that is no light, as a direction's is.
 #[must_use]
 pub fn luminance_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
     let layers: Vec<&str> = layers_with(names, &["Y"]).into_iter().filter(|layer| !is_auxiliary(layer)).collect();
@@ -118,7 +119,8 @@ fn is_auxiliary(layer: &str) -> bool {
         || BLENDER_PASSES.iter().any(|name| is_called(layer, name))
 }
 
-/// Words of a name, which dots, underscores, spaces, digits and capitals part: `VRayDiffuse_filter2` has `V`, `Ray`, `Diffuse`, `filter`.
+/// Words of a name, which dots, underscores, spaces, digits and capitals part: `VRayDiffuse_filter2` has `V`,
+/// `Ray`, `Diffuse`, `filter`.
 fn words(name: &str) -> Vec<&str> {
     let bytes = name.as_bytes();
     let begins = |i: usize| {
@@ -144,7 +146,8 @@ fn is_not_the_pictures(word: &str) -> bool {
     NOT_THE_PICTURE.iter().any(|name| word.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest == "s"))
 }
 
-/// The same for a file that may have auxiliaries alone, as of a texture or of a painted mask: the first of them then.
+/// The layer of a file's colours, for files that may have auxiliaries alone, as of a texture or of a painted
+/// mask: the first of them then.
 #[must_use]
 pub fn colour_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
     picture_layer(names).or_else(|| PictureLayer::among(layers_with(names, &RGB)))

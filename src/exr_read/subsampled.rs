@@ -1,7 +1,7 @@
 //! Scan-line files whose channels have different resolutions, as luminance-chroma pictures have.
 //!
-//! The `exr` crate refuses them, though its decompression knows them. So its header reader is shown a copy whose channels
-//! all have full resolution, and the blocks are found and unpacked one by one here.
+//! The `exr` crate refuses them, though its decompression knows them. So its header reader is shown a copy whose
+//! channels all have full resolution, and the blocks are found and unpacked one by one here.
 
 use super::checks::{check_memory, guarded, read_headers};
 use super::wanted::Wanted;
@@ -58,8 +58,8 @@ fn integer(file: &[u8], at: usize) -> Option<i32> {
     Some(i32::from_le_bytes(file.get(at..at.checked_add(4)?)?.try_into().ok()?))
 }
 
-/// The picture of a file with channels of different resolutions, all brought to full resolution by linear interpolation;
-/// `None` for other files.
+/// The picture of a file with channels of different resolutions, all brought to full resolution by linear
+/// interpolation; `None` for other files.
 pub(super) fn read(path: &Path, file: &[u8]) -> Result<Option<ExrImage>, ExrReadError> {
     let Some(found) = scan(file).filter(|found| found.samplings.iter().any(|s| (s.x, s.y) != (1, 1))) else {
         return Ok(None);
@@ -214,7 +214,8 @@ impl Blocks<'_> {
         let unpacked = if data.len() == bytes {
             data.to_vec()
         } else {
-            // The library takes the bytes of a block for a whole number a pixel, and lines for a multiple of the sampling.
+            // The library takes the bytes of a block for a whole number a pixel, and lines for a multiple of the
+            // sampling.
             let whole = count == 1 || self.channels.iter().all(|plane| count.is_multiple_of(plane.step_y));
             if !bytes.is_multiple_of(area) || !whole {
                 return Ok(false);

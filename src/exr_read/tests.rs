@@ -148,7 +148,8 @@ fn parts_stand_where_they_are() {
     assert_eq!(image.parts_left_out, ["c"]);
 }
 
-/// A part that was cropped or overscanned is put to the picture's pixels, and what the picture's part lacks is taken from others.
+/// A part that was cropped or overscanned is put to the picture's pixels, and what the picture's part lacks is taken
+/// from others.
 #[test]
 fn parts_of_other_sizes_stand_where_they_are() {
     let folder = tempfile::tempdir().unwrap();
@@ -259,8 +260,8 @@ fn only_channels_that_are_asked_for_are_read() {
     assert!(message.contains("8192×24000 pixels of 2 channels need 1500 MiB"), "{message}");
 }
 
-/// The named linear spaces of the Color Interop Forum, and the flag of an ACES container, say what chromaticities would: AP1's red was taken
-/// for Rec.709's.
+/// The named linear spaces of the Color Interop Forum, and the flag of an ACES container, say what chromaticities
+/// would. Regression: AP1's red was taken for Rec.709's.
 #[test]
 fn colour_spaces_are_known_by_name() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Reads some channels of a file and passes over the others, which production files have by the dozen.
+//! Chooses which channels of a file are read; the others, which production files have by the dozen, are passed over.
 
 use ::exr::block::chunk::TileCoordinates;
 use ::exr::block::lines::LineRef;
@@ -19,7 +19,7 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// Those of all parts that `choose` chooses among the names of all.
+    /// The channels of all parts that `choose` chooses among the names of all.
     pub(super) fn of(headers: &[Header], choose: impl FnOnce(&[String]) -> Vec<String>) -> Self {
         let mut wanted = Self { names: HashSet::new(), has_several_parts: headers.len() > 1 };
         let all: Vec<String> = headers.iter().flat_map(|header| wanted.names_of(header)).collect();

@@ -1,9 +1,9 @@
-//! Rectangles of pixels, and pictures put from one into another.
+//! Rectangles of pixels, and pictures put from one into another. What the pixels mean is not known here.
 
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// Its top left pixel, x to the right and y down.
+    /// Top left pixel of the rectangle, x to the right and y down.
     pub origin: (i32, i32),
     /// Width in pixels.
     pub width: u32,

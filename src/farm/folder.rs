@@ -1,4 +1,4 @@
-//! Where a farm's files are, and how units are numbered.
+//! Where a farm's files are, and how units are numbered. What is in the files is left to those who write them.
 
 use super::manifest::{FrameEntry, Manifest, ManifestError, Work};
 use crate::animate::name::FrameName;
@@ -87,7 +87,7 @@ impl Farm {
         &self.manifest.frames[frame_index]
     }
 
-    /// There once all is made that needs all frames.
+    /// Path of the mark that is there once all is made that needs all frames.
     pub fn concluded(&self) -> PathBuf {
         self.folder.join(CONCLUDED)
     }
@@ -123,7 +123,8 @@ impl Farm {
         self.folder.join(format!("frame-{:04}", self.frame(frame_index).frame))
     }
 
-    /// All rounds merged so far, and the open one's plan; missing before the first merge and after the end.
+    /// Path of a frame's film: all rounds merged so far, and the open one's plan; missing before the first merge and
+    /// after the end.
     pub fn film(&self, frame_index: usize) -> PathBuf {
         self.frame_folder(frame_index).join("film")
     }

@@ -62,7 +62,7 @@ pub fn progress(farm: &Farm, frame_index: usize) -> FrameState {
 
 /// What a frame's film is traced and judged by.
 pub struct FrameJob<'a> {
-    /// Its scene, and its seed.
+    /// Tracer of the frame's scene, by the frame's seed.
     pub tracer: &'a PathTracer,
     /// When it is done.
     pub settings: &'a LoopSettings,
@@ -102,9 +102,9 @@ pub enum Merged {
     Ended(Box<Ended>),
 }
 
-/// Merges a frame's open round if all its units are there, and hands out the next. Rounds too small for units are traced here.
-/// Call it with the frame's lock. Killed at any moment, it does the same when it is called again. A film that is damaged is put
-/// aside, and the frame begins anew.
+/// Merges a frame's open round if all its units are there, and hands out the next. Rounds too small for units are
+/// traced here. Call it with the frame's lock. Killed at any moment, it does the same when it is called again. A film
+/// that is damaged is put aside, and the frame begins anew.
 ///
 /// # Errors
 /// [`FrameError`] if the film's file cannot be read, or something cannot be written.
@@ -151,8 +151,8 @@ pub fn merge_frame(
     Ok(Merged::Planned(record))
 }
 
-/// Marks a frame as done by its figures, after its picture is written, and `kept` beside it, its film. Clears everything away
-/// that only a render under way needs.
+/// Marks a frame as done by its figures, after its picture is written, and `kept` beside it, its film. Clears
+/// everything away that only a render under way needs.
 ///
 /// # Errors
 /// If something cannot be written.
@@ -198,8 +198,8 @@ struct Lacking {
     refused: Vec<UnitError>,
 }
 
-/// Enters the sums of all units into the film in the plan's order, as a render in one process does. Nothing is entered where
-/// one is missing; where one is refused, others are.
+/// Enters the sums of all units into the film in the plan's order, as a render in one process does. Nothing is entered
+/// where one is missing; where one is refused, others are.
 fn enter(farm: &Farm, units: &[(NamedOrder, Vec<u8>)], state: &mut RenderState) -> Result<(), Lacking> {
     let files: Vec<_> = units.iter().map(|(named, _)| (named, farm.unit_file(named.order.unit, "sums"))).collect();
     let are_missing = files.iter().filter(|(_, path)| !path.exists());
@@ -247,8 +247,8 @@ pub fn set_aside(path: &Path) {
     }
 }
 
-/// Traces what is planned, and writes the film as often as it is asked for. It may be left between two batches: what is not traced
-/// then is still no unit's.
+/// Traces what is planned, and writes the film as often as it is asked for. It may be left between two batches: what is
+/// not traced then is still no unit's.
 fn trace_here(
     farm: &Farm,
     frame_index: usize,

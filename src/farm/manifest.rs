@@ -1,4 +1,4 @@
-//! What a farm renders.
+//! What a farm renders, as all its processes read it. How far it is stands in the folder, never here.
 
 use crate::checkpoint::{Origin, PROGRAM};
 use crate::output::PictureFormat;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Raised whenever a field means something else.
 pub(super) const FORMAT: u32 = 1;
 
-/// Everything that all processes of a farm must agree on; written once, before the first round.
+/// What all processes of a farm must agree on; written once, before the first round.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Manifest {
     /// Version of this file.
@@ -47,7 +47,7 @@ pub enum Work {
 /// One frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameEntry {
-    /// Its number; 0 for a still.
+    /// Number of the frame; 0 for a still.
     pub frame: u32,
     /// Seed of its samples.
     pub seed: u64,
@@ -87,7 +87,7 @@ pub enum ManifestError {
 }
 
 impl Manifest {
-    /// One of this program and format.
+    /// A manifest of this program and format.
     pub fn new(work: Work, directory: PathBuf, arguments: Vec<String>, frames: Vec<FrameEntry>) -> Self {
         Self {
             farm_format: FORMAT,

@@ -15,18 +15,19 @@ use std::ops::Range;
 pub struct RoundRecord {
     /// Number of the frame.
     pub frame: u32,
-    /// Plans traced of the frame before: rises from round to round, by more than 1 where others were traced by the merge.
+    /// Number of the round: how many plans of the frame were traced before it. It rises from round to round, by more
+    /// than 1 where others were traced by the merge.
     pub round: u32,
     /// Samples of all units.
     pub samples: u64,
-    /// In the order in which they are merged.
+    /// Units in the order in which they are merged.
     pub units: Vec<UnitRecord>,
 }
 
 /// A unit in a round.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UnitRecord {
-    /// Its number.
+    /// Number of the unit.
     pub unit: u64,
     /// Seed of its samples.
     pub seed: u64,
@@ -38,8 +39,8 @@ pub struct UnitRecord {
     pub samples: u64,
 }
 
-/// Cuts blocks into as many ranges of about equal samples as give each at least `unit_samples`, at most `passes`; fewer where
-/// single blocks are larger than that, none at all if there are fewer samples.
+/// Cuts blocks into as many ranges of about equal samples as give each at least `unit_samples`, at most `passes`; fewer
+/// where single blocks are larger than that, none at all if there are fewer samples.
 pub fn cut(blocks: &[BlockWork], passes: u32, unit_samples: u64) -> Vec<Range<usize>> {
     let total: u64 = blocks.iter().map(|block| u64::from(block.samples)).sum();
     if total < unit_samples.max(1) {
@@ -113,7 +114,8 @@ pub fn open_round(farm: &Farm, frame_index: usize) -> Option<RoundRecord> {
     last_record(|| rounds(farm, frame_index), |round| record(farm, frame_index, round))
 }
 
-/// The last record of those that are listed. A merge may clear a round away between list and record: then the list is another.
+/// The last record of those that are listed. A merge may clear a round away between list and record: then the list is
+/// another.
 fn last_record<T>(mut list: impl FnMut() -> Vec<u32>, read: impl Fn(u32) -> Option<T>) -> Option<T> {
     let mut listed = list();
     loop {

@@ -60,7 +60,7 @@ pub struct NamedOrder {
 /// What a unit sampled: all blocks of its order, or the first of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UnitSums {
-    /// Of which order.
+    /// Hash of the order that these sums are of.
     pub order: ContentHash,
     /// Time that it took.
     pub seconds: f64,
@@ -71,7 +71,7 @@ pub struct UnitSums {
 /// Why a unit's file could not be used.
 #[derive(Debug, thiserror::Error)]
 pub enum UnitError {
-    /// It is not whole.
+    /// The file is not whole.
     #[error(transparent)]
     Sealed(#[from] SealedError),
     /// Sound, but of another unit.
@@ -181,8 +181,8 @@ pub struct Keeping<'a> {
 }
 
 impl Keeping<'_> {
-    /// Between two batches: writes what is there where that is wished, or where it is time to. A checkpoint that cannot be written
-    /// is no reason to lose the work, unless it ends with it.
+    /// Decides between two batches: writes what is there where that is wished, or where it is time to. A checkpoint
+    /// that cannot be written is no reason to lose the work, unless it ends with it.
     ///
     /// # Errors
     /// If the checkpoint that was asked for at the end cannot be written.
@@ -214,8 +214,8 @@ pub(super) fn most_samples_a_batch() -> u64 {
     MOST_SAMPLES_A_THREAD * rayon::current_num_threads() as u64
 }
 
-/// Samples what an order asks for after `begun`, and writes the sums: a checkpoint every so often and where it is wished, the result
-/// at the end.
+/// Samples what an order asks for after `begun`, and writes the sums: a checkpoint every so often and where it is
+/// wished, the result at the end.
 ///
 /// # Errors
 /// If the result, or the checkpoint that was asked for at the end, cannot be written.

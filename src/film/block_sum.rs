@@ -1,4 +1,5 @@
-//! What a block of samples adds up to, before it is merged into a film.
+//! What a block of samples adds up to, before it is merged into a film. Not for pictures: halves and
+//! variances come of the merge.
 
 use super::{CHANNELS, opponent};
 use crate::integrator::PathSample;
@@ -14,7 +15,7 @@ pub struct BlockSum {
     pub(super) nonfinite: u32,
     pub(super) rays: u64,
     pub(super) rgb: [f64; 3],
-    /// Of luminance and the opponent channels.
+    /// Squares of luminance and the opponent channels.
     pub(super) squares: [f64; CHANNELS],
     pub(super) albedo: Vec3,
     pub(super) normal: Vec3,

@@ -54,7 +54,8 @@ impl PixelGuide {
         }
     }
 
-    /// What is left without a part that has this share, less than all, of the samples. Where that is no number, the whole.
+    /// What is left without a part that has this share, less than all, of the samples. Where that is no number, the
+    /// whole.
     pub(super) fn without(&self, part: &Self, share: f32) -> Self {
         let left = |whole: f32, part: f32| {
             let left = whole + (whole - part) * (share / (1.0 - share));

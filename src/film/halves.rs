@@ -8,7 +8,8 @@ use crate::sampler::Half;
 pub enum Halves<'a> {
     /// Both have.
     Both([&'a HalfPixel; 2]),
-    /// One has, as in a render of one sample or one that was interrupted in its first pass: it is the picture. Empty where neither has.
+    /// One has, as in a render of one sample or one that was interrupted in its first pass: it is the
+    /// picture. Empty where neither has.
     Only(&'a HalfPixel),
 }
 
@@ -27,14 +28,14 @@ fn variance_of_mean_of_both(of_sample: [f64; 2], samples: [u32; 2]) -> f64 {
 }
 
 impl HalfPixel {
-    /// Of the mean, scene units.
+    /// Luminance of the mean, scene units.
     pub fn luminance(&self) -> f64 {
         opponent(self.mean)[0]
     }
 }
 
 impl<'a> Halves<'a> {
-    /// Of A and B.
+    /// The halves A and B of a pixel.
     pub fn of([a, b]: [&'a HalfPixel; 2]) -> Self {
         match [a.samples, b.samples] {
             [_, 0] => Self::Only(a),
@@ -83,8 +84,8 @@ impl<'a> Halves<'a> {
         std::array::from_fn(|channel| self.sample_variance(channel))
     }
 
-    /// Variance of the mean in an opponent channel by the samples' own scatter: (s_A²/n_A + s_B²/n_B) / 4, or s²/n where one half has all
-    /// samples. 0 of a single sample.
+    /// Variance of the mean in an opponent channel by the samples' own scatter: (s_A²/n_A + s_B²/n_B) / 4, or s²/n
+    /// where one half has all samples. 0 of a single sample.
     pub fn variance_of_mean(self, channel: usize) -> f64 {
         match self {
             Self::Both(both) => {
@@ -95,8 +96,8 @@ impl<'a> Halves<'a> {
     }
 }
 
-/// Unbiased variance of one sample, as each half has it. A half of one sample takes the other's; where both have one, what they differ by
-/// tells, and both have that.
+/// Unbiased variance of one sample, as each half has it. A half of one sample takes the other's; where both have one,
+/// what they differ by tells, and both have that.
 fn variances_of_both([a, b]: [&HalfPixel; 2], channel: usize) -> [f64; 2] {
     match (a.samples, b.samples) {
         (1, 1) => [0.5 * (opponent(a.mean)[channel] - opponent(b.mean)[channel]).powi(2); 2],

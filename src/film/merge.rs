@@ -1,4 +1,5 @@
-//! Adding films of the same picture, and checking one that was in a file.
+//! Adds films of the same picture, and checks one that was in a file. Whether they are of one scene is left to
+//! `checkpoint`.
 
 use super::{Film, HalfPixel, Moments, PixelGuide};
 use crate::sampler::Half;
@@ -14,8 +15,8 @@ impl Film {
     /// Most pixels that a film may have: they are numbered by `u32`, and halves of them counted.
     pub const MOST_PIXELS: u32 = u32::MAX / 2;
 
-    /// Adds the samples of another film, half to half: as if one film had taken both. The other must be of this size and
-    /// of other random numbers.
+    /// Adds the samples of another film, half to half: as if one film had taken both. The other must be of this size
+    /// and of other random numbers.
     ///
     /// # Errors
     /// Where a pixel would hold more samples than can be counted; nothing is added then.
@@ -45,7 +46,7 @@ impl Film {
         Ok(())
     }
 
-    /// The same film with its halves in each other's place.
+    /// This film with its halves in each other's place.
     #[must_use]
     pub fn with_halves_swapped(mut self) -> Self {
         let of_b: Vec<PixelGuide> = (0..self.guides.len()).map(|pixel| self.guide_of_half(Half::B, pixel)).collect();

@@ -50,7 +50,8 @@ pub fn opponent(rgb: [f64; 3]) -> [f64; CHANNELS] {
     OPPONENT_OF_RGB.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2])
 }
 
-/// A sum of squared deviations as the film keeps it: what is beyond f32 stays at its end, which is finite, and can be read again.
+/// A sum of squared deviations as the film keeps it: what is beyond f32 stays at its end, which is finite, and can be
+/// read again.
 fn kept_m2(m2: f64) -> f32 {
     m2.min(f64::from(f32::MAX)) as f32
 }
@@ -90,8 +91,8 @@ impl HalfPixel {
         self.combine(&Moments::of_block(block));
     }
 
-    /// Adds other samples (Chan, Golub and LeVeque 1983). Counts end at their largest: [`Film::add`] and [`Film::check`] refuse what comes
-    /// near it.
+    /// Adds other samples (Chan, Golub and LeVeque 1983). Counts end at their largest: [`Film::add`] and
+    /// [`Film::check`] refuse what comes near it.
     fn combine(&mut self, others: &Moments) {
         self.taken = self.taken.saturating_add(others.taken);
         if others.samples == 0 {
@@ -128,15 +129,16 @@ pub struct Film {
     width: u32,
     height: u32,
     halves: [Vec<HalfPixel>; 2],
-    /// Of all samples.
+    /// Guides of all samples.
     guides: Vec<PixelGuide>,
-    /// Of the first half's. The other's are what is left.
+    /// Guides of the first half's samples. The other's are what is left.
     guides_of_a: Vec<PixelGuide>,
     /// Samples that were not finite.
     pub nonfinite_samples: u64,
     /// Rays traced.
     pub rays: u64,
-    /// What is known of things that its samples may pass by, once somebody who knows the scene has said so. Not kept in files.
+    /// What is known of things that its samples may pass by, once somebody who knows the scene has said so. Not kept in
+    /// files.
     #[serde(skip)]
     pub known_things: Option<KnownThings>,
 }
@@ -167,7 +169,7 @@ impl Film {
         self.height
     }
 
-    /// Its pixels.
+    /// Number of the film's pixels.
     pub fn pixel_count(&self) -> usize {
         self.guides.len()
     }
@@ -217,8 +219,8 @@ impl Film {
         }
     }
 
-    /// Whether every pixel was sampled in both halves. Otherwise nothing is known of its noise: in a render of one sample a pixel, or one
-    /// that was interrupted in its first pass.
+    /// Whether every pixel was sampled in both halves. Otherwise nothing is known of its noise: in a render of one
+    /// sample a pixel, or one that was interrupted in its first pass.
     pub fn has_both_halves(&self) -> bool {
         self.halves.iter().flatten().all(|pixel| pixel.taken > 0)
     }
@@ -315,8 +317,8 @@ mod tests {
         assert!((found - 0.5).abs() < 1e-6, "a half of one sample takes the other's: {found}");
     }
 
-    /// Where one half has all samples, as in a sum of renders of one sample with even seeds, it alone is the picture, and the variance is
-    /// that of its mean: a quarter of it was told.
+    /// Where one half has all samples, as in a sum of renders of one sample with even seeds, it alone is the picture,
+    /// and the variance is that of its mean. Regression: a quarter of it was told.
     #[test]
     fn a_half_without_samples_has_no_say() {
         for half in Half::BOTH {
@@ -331,7 +333,8 @@ mod tests {
         }
     }
 
-    /// Each half knows what its own samples have met, after blocks in any order; a surface at infinity leaves no number that is none.
+    /// Each half knows what its own samples have met, after blocks in any order; a surface at infinity leaves no number
+    /// that is none.
     #[test]
     fn halves_have_guides_of_their_own() {
         let sum = |albedo: f32, depth: f32, samples: u32| {
@@ -357,7 +360,8 @@ mod tests {
         assert_eq!(film.guide_of_half(Half::B, 0).depth, f32::INFINITY, "where the whole is infinite");
     }
 
-    /// Squares of light that is far above all others' are beyond f32: what the film keeps of them can still be read back and added to.
+    /// Squares of light that is far above all others' are beyond f32: what the film keeps of them can still
+    /// be read back and added to.
     #[test]
     fn no_finite_light_makes_a_film_that_cannot_be_read() {
         let film_of = |values: [&[f32]; 2]| {

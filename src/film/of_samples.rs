@@ -1,4 +1,4 @@
-//! Films of samples that tests make up.
+//! Makes films of samples that tests make up.
 
 use super::{BlockSum, Film};
 use crate::integrator::{BlockWork, PathSample};

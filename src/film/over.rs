@@ -1,10 +1,10 @@
-//! A film whose uncovered parts let an even ground through.
+//! A film whose uncovered parts let an even ground through. For judging, never for the picture that is written.
 
 use super::{CHANNELS, Film, HalfPixel};
 
 impl Film {
-    /// The film as shown before a ground that is `ground_cd_m2` brighter than black: luminance alone, in cd/m². `scale`: displayed variance over
-    /// scene variance of each pixel's luminance, row-major.
+    /// The film as shown before a ground that is `ground_cd_m2` brighter than black: luminance alone, in cd/m².
+    /// `scale`: displayed variance over scene variance of each pixel's luminance, row-major.
     ///
     /// # Panics
     /// Where there are fewer scales than pixels.
@@ -19,8 +19,9 @@ impl Film {
 }
 
 impl HalfPixel {
-    /// A sample that met nothing brought no light, so the sum of light times coverage is that of light, and what both do together is known
-    /// without having been summed: the squared deviations are those of light + ground · (1 − coverage).
+    /// A sample that met nothing brought no light, so the sum of light times coverage is that of light, and what both
+    /// do together is known without having been summed: the squared deviations are those of
+    /// light + ground · (1 − coverage).
     fn over_ground(&self, scale: f64, ground_cd_m2: f64) -> Self {
         let samples = f64::from(self.samples);
         let missed = f64::from(self.missed);

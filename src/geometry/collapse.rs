@@ -1,8 +1,8 @@
 //! From obvhs's binary tree to eight-wide nodes and blocks of triangles.
 //!
 //! Which binary nodes become wide ones, which become leaves and which vanish is the cheapest of all choices under the
-//! surface area heuristic, found by dynamic programming (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on
-//! GPUs Through Compressed Wide BVHs", HPG 2017, section 3.1). A block costs the same whether it is full or not.
+//! surface area heuristic, found by dynamic programming (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal
+//! on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.1). A block costs the same whether it is full or not.
 
 use super::tree::{Bounds, BuiltTree, build_binary};
 use super::wide_tree::{Child, LANES, Node};
@@ -19,7 +19,7 @@ pub(super) struct Collapsed {
     pub(super) blocks: Vec<Range<usize>>,
     /// Primitive numbers.
     pub(super) order: Vec<u32>,
-    /// `None` where there is nothing.
+    /// Root of the tree; `None` where there is nothing.
     pub(super) root: Option<Child>,
 }
 
@@ -37,8 +37,8 @@ pub(super) fn build(bounds: &[Bounds]) -> Collapsed {
 struct Choice {
     /// By number of subtrees − 1.
     cost: [f32; 7],
-    /// How many of the subtrees the left child makes; 0 where fewer are as good. Index 0 (one subtree) holds the split of
-    /// all eight slots if it becomes a wide node, 0 if it becomes a leaf.
+    /// How many of the subtrees the left child makes; 0 where fewer are as good. Index 0 (one subtree) holds the split
+    /// of all eight slots if it becomes a wide node, 0 if it becomes a leaf.
     left: [u8; 7],
     /// Triangles below, up to [`LANES`] + 1.
     count: u8,

@@ -1,7 +1,7 @@
 //! Normal and area of a triangle of any size.
 //!
-//! The cross product of edges beyond 4·10⁹ units squares to more than a float holds, that of edges below 10⁻¹¹ to less. So
-//! such edges are brought near 1 by powers of two first, which round nothing.
+//! The cross product of edges beyond 4·10⁹ units squares to more than a float holds, that of edges below 10⁻¹¹ to less.
+//! So such edges are brought near 1 by powers of two first, which round nothing.
 
 use glam::{Mat3A, Vec3, Vec3A};
 
@@ -10,12 +10,13 @@ use glam::{Mat3A, Vec3, Vec3A};
 pub(crate) struct Face {
     /// Unit, on the side from which the edges turn counter-clockwise.
     pub(crate) normal: Vec3,
-    /// In square scene units.
+    /// Area of the triangle in square scene units.
     pub(crate) area: f32,
 }
 
 impl Face {
-    /// Of a triangle by the two edges that leave one of its corners; `None` where they span no area or are not finite.
+    /// The face of a triangle by the two edges that leave one of its corners; `None` where they span no area or are not
+    /// finite.
     #[inline(always)]
     pub(crate) fn spanned_by(edges: [Vec3A; 2]) -> Option<Self> {
         /// Squares of the cross products that lose nothing by their size.
@@ -53,7 +54,7 @@ pub(super) fn scaled_to_one(matrix: Mat3A) -> Mat3A {
 #[inline]
 fn scale_to_one(magnitude: f32) -> f32 {
     const MANTISSA_BITS: u32 = 23;
-    /// Of 1, as it is stored.
+    /// Exponent of 1, as it is stored.
     const EXPONENT_OF_ONE: u32 = 127;
     let exponent = (magnitude.to_bits() >> MANTISSA_BITS) & 0xff;
     f32::from_bits((2 * EXPONENT_OF_ONE - exponent.clamp(1, 2 * EXPONENT_OF_ONE - 1)) << MANTISSA_BITS)

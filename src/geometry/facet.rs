@@ -1,4 +1,4 @@
-//! One piece of a surface in the world.
+//! One piece of a surface in the world. For those who look at surfaces, not for rays.
 
 use glam::Vec3;
 
@@ -17,7 +17,7 @@ pub enum Facet {
 }
 
 impl Facet {
-    /// Its middle.
+    /// Middle of the facet.
     pub fn center(&self) -> Vec3 {
         match self {
             Self::Triangle(corners) => corners.iter().sum::<Vec3>() / 3.0,

@@ -1,9 +1,9 @@
 //! The wide tree of a mesh, in coordinates of its own.
 //!
-//! They are centred along the axes on which that rounds no coordinate, so that tests keep their precision far from the origin,
-//! and scaled by a power of two until the largest extent is between 512 and 1024, so that no product of the triangle test leaves
-//! the range of f32. Neither changes a bit of what a coordinate says: shared vertices stay shared, distances scale exactly, and
-//! small things near the origin stay what they are however far away another one is.
+//! They are centred along the axes on which that rounds no coordinate, so that tests keep their precision far from the
+//! origin, and scaled by a power of two until the largest extent is between 512 and 1024, so that no product of the
+//! triangle test leaves the range of f32. Neither changes a bit of what a coordinate says: shared vertices stay shared,
+//! distances scale exactly, and small things near the origin stay what they are however far away another one is.
 
 use super::face::Face;
 use super::tree::Bounds;
@@ -25,7 +25,7 @@ pub(super) struct MeshHit {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TriangleShape {
     pub(super) corner: Vec3A,
-    /// To the second and to the third corner.
+    /// Edges from the corner to the second and to the third one.
     pub(super) edges: [Vec3A; 2],
 }
 
@@ -111,8 +111,8 @@ impl MeshTree {
         self.tree.reference(place)
     }
 
-    /// The triangle at a [`MeshHit::place`], in the coordinates that the tree was given, from memory that the walk has just read.
-    /// The corner is exact.
+    /// The triangle at a [`MeshHit::place`], in the coordinates that the tree was given, from memory that the walk has
+    /// just read. The corner is exact.
     #[inline]
     pub(super) fn shape(&self, place: u32) -> TriangleShape {
         let [a, b, c] = self.tree.corners(place);
@@ -130,8 +130,8 @@ impl MeshTree {
     }
 }
 
-/// The centre along axes where no number of the bounds is three times another, 0 along the others. Taken from a number of at least its
-/// half and at most its double, a number leaves an exact difference (Sterbenz 1974).
+/// The centre along axes where no number of the bounds is three times another, 0 along the others. Taken from a number
+/// of at least its half and at most its double, a number leaves an exact difference (Sterbenz 1974).
 fn exact_center(bounds: &Bounds) -> Vec3A {
     let center = 0.5 * bounds.min + 0.5 * bounds.max;
     let (low, high) = (bounds.min.abs().min(bounds.max.abs()), bounds.min.abs().max(bounds.max.abs()));
@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(rays, 3 * 6 * 20 * 256);
     }
 
-    /// Hazard 2: a mesh of any size keeps all its hits (obvhs's wide tree alone lost 11 % at 1e-4 and all at 1e-5).
+    /// Hazard 2: a mesh of any size keeps all its hits (obvhs's wide tree alone loses 11 % at 1e-4 and all at 1e-5).
     #[test]
     fn tiny_and_huge_meshes_keep_their_hits() {
         for radius in [1e-6f32, 1e-4, 1.0, 1e5] {

@@ -1,8 +1,9 @@
 //! Rays, triangles, spheres and the two-level tree that finds what a ray hits.
 //!
-//! [`World`] is what the rest of the program sees: `closest` and `occluded`, and [`World::surface`] for what is there.
-//! Triangles are in eight-wide trees of our own (`wide_tree`), many things in a binary one of obvhs, which builds both ([`tree`]). The
-//! triangle test is ours, because a leak at a shared edge is a firefly that an adaptive sampler would chase for ever.
+//! [`World`] is what the rest of the program sees: `closest` and `occluded`, and [`World::surface`] for what is
+//! there. Triangles are in eight-wide trees of our own (`wide_tree`), many things in a binary one of obvhs, which
+//! builds both ([`tree`]). The triangle test is ours, because a leak at a shared edge is a firefly that an adaptive
+//! sampler would chase for ever.
 
 mod collapse;
 mod face;
@@ -41,10 +42,11 @@ pub struct Ray {
 /// How a ray meets surfaces that alpha leaves in place only partly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coverage {
-    /// By chance, so that the mean over rays is the blend.
+    /// Covered by chance, so that the mean over rays is the blend.
     #[default]
     ByChance,
-    /// Wherever they cover half or more: for what has one value at a point, such as motion, and would be salt and pepper by chance.
+    /// Wherever they cover half or more: for what has one value at a point, such as motion, and would be salt and
+    /// pepper by chance.
     ByHalf,
 }
 

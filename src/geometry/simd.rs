@@ -1,9 +1,10 @@
-//! Box and triangle tests of eight lanes at once, for AVX2 and for any machine, the choice between the two, and the same choice
-//! for work elsewhere that the compiler turns into vectors.
+//! Box and triangle tests of eight lanes at once, for AVX2 and for any machine, the choice between the two, and the
+//! same choice for work elsewhere that the compiler turns into vectors.
 //!
 //! Both have the same operations in the same order and no fused multiply-add, so their results are equal to the bit;
-//! minimum and maximum are x86's: the second operand where one is NaN. The only `unsafe` besides that of `denoise/oidn/library.rs`
-//! is here: calling a function that was compiled for AVX2, after asking the machine whether it has it, and prefetching.
+//! minimum and maximum are x86's: the second operand where one is NaN. The only `unsafe` besides that of
+//! `denoise/oidn/library.rs` is here: calling a function that was compiled for AVX2, after asking the machine whether
+//! it has it, and prefetching.
 
 #![allow(
     unsafe_code,
@@ -25,7 +26,7 @@ enum Instructions {
 }
 
 impl Kernels {
-    /// For any machine.
+    /// Kernels for any machine.
     pub(super) const PORTABLE: Self = Self(Instructions::Portable);
 
     /// The fastest that this machine has.
@@ -40,7 +41,8 @@ impl Kernels {
 
 /// Work on several values at once, as loops that the compiler turns into vectors.
 pub(crate) trait VectorWork {
-    /// Does it. `#[inline(always)]`, as must be all that it calls: what is no part of [`with_vectors`] is not compiled for vectors.
+    /// Does it. `#[inline(always)]`, as must be all that it calls: what is no part of [`with_vectors`] is not compiled
+    /// for vectors.
     fn run(self);
 }
 

@@ -13,7 +13,8 @@ pub enum Side {
     Far,
 }
 
-/// The nearest ray parameter in (0, `t_max`) at which the ray meets the sphere, from outside or inside, and that is accepted.
+/// The nearest ray parameter in (0, `t_max`) at which the ray meets the sphere, from outside or inside, and that is
+/// accepted.
 pub fn intersect(ray: &Ray, center: Vec3A, radius: f32, t_max: f32, accept: impl Fn(f32, Side) -> bool) -> Option<f32> {
     let to_center = center - ray.origin;
     let along = to_center.dot(ray.direction);

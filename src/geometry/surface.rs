@@ -11,8 +11,8 @@ pub struct SurfacePoint {
     pub geometric_normal: Vec3,
     /// Unit normal for shading, on the same side.
     pub shading_normal: Vec3,
-    /// Along growing u where the material asks for it (`needs_tangent`), else `None`; neither of unit length nor perpendicular to
-    /// the shading normal.
+    /// Along growing u where the material asks for it (`needs_tangent`), else `None`; neither of unit length nor
+    /// perpendicular to the shading normal.
     pub tangent: Option<Vec3>,
     /// +1 or −1: the bitangent is this times shading_normal × tangent.
     pub handedness: f32,
@@ -72,8 +72,8 @@ impl Frame {
         self.0.transpose() * world
     }
 
-    /// Local to world, for a direction whose length is 1 to within 1e-4: in the world it is 1 to within f32, by one step of Newton's
-    /// towards the inverse root.
+    /// Local to world, for a direction whose length is 1 to within 1e-4: in the world it is 1 to within f32, by one
+    /// step of Newton's towards the inverse root.
     pub fn to_world_direction(&self, local: Vec3) -> Vec3 {
         let world = self.to_world(local);
         world * (1.5 - 0.5 * world.length_squared())

@@ -67,8 +67,9 @@ impl Boundable for Boxed {
     }
 }
 
-/// obvhs's binary tree over numbered primitives, walked by obvhs: for few large things such as instances, in any coordinates. Callers
-/// reorder their primitives by [`BinaryTree::order`] once and are then called back with positions in that order.
+/// obvhs's binary tree over numbered primitives, walked by obvhs: for few large things such as instances, in
+/// any coordinates. Callers reorder their primitives by [`BinaryTree::order`] once and are then called back
+/// with positions in that order.
 pub struct BinaryTree {
     tree: Bvh2,
     order: Vec<u32>,
@@ -102,7 +103,7 @@ fn prepare(bounds: &[Bounds]) -> Input {
 /// What obvhs built.
 pub(super) struct BuiltTree {
     pub(super) tree: Bvh2,
-    /// By obvhs's primitive index: the number of the box it was given as.
+    /// Number of each box as it was given, by obvhs's primitive index.
     pub(super) numbers: Vec<u32>,
 }
 
@@ -190,7 +191,8 @@ mod tests {
         assert_eq!(build_and_count(&[unit_box(0.0)]), 1);
     }
 
-    /// 20,000 identical boxes took 11 s with the medium preset, 0.85 s with the fastest: chosen by count, not by a clock.
+    /// 20,000 identical boxes take 11 s with the medium preset, 0.85 s with the fastest: chosen by count, not by a
+    /// clock.
     #[test]
     fn coinciding_centroids_choose_the_fast_builder() {
         let fastest = BvhBuildParams::fastest_build().reinsertion_batch_ratio;

@@ -1,8 +1,8 @@
 //! Watertight ray–triangle test (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013).
 //!
 //! A ray that meets a closed mesh at an edge or a vertex hits at least one of the triangles that share it, which the
-//! usual Möller–Trumbore form does not promise (measured on obvhs's own test: 9.4 % of rays aimed at edges leak). Unlike there, how far
-//! away a near hit is comes from the triangle's plane.
+//! usual Möller–Trumbore form does not promise (measured on obvhs's own test: 9.4 % of rays aimed at edges leak).
+//! Unlike there, how far away a near hit is comes from the triangle's plane.
 
 use glam::Vec3A;
 
@@ -19,8 +19,8 @@ pub struct ShearedRay {
     pub(super) near_scale: f32,
 }
 
-/// A hit this share as far as the farthest of the triangle's corners along the ray, or less, is near: there its distance is small against what
-/// it would be the difference of.
+/// A hit this share as far as the farthest of the triangle's corners along the ray, or less, is near: there its
+/// distance is small against what it would be the difference of.
 const NEAR: f32 = 1.0 / 128.0;
 
 /// Where a triangle is hit.
@@ -34,16 +34,18 @@ pub struct TriangleHit {
     pub b2: f32,
 }
 
-/// The other two axes by the longest one: in turn, and the other way around for rays towards −z, which keeps the winding.
+/// The other two axes by the longest one: in turn, and the other way around for rays towards −z, which keeps the
+/// winding.
 const OTHER_AXES: [[[usize; 2]; 2]; 3] = [[[1, 2], [2, 1]], [[2, 0], [0, 2]], [[0, 1], [1, 0]]];
 
 impl ShearedRay {
-    /// `direction` must not be zero.
+    /// A ray made ready for triangle tests. `direction` must not be zero.
     pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
         Self::with_inverse(origin, direction, (1.0 / direction).to_array())
     }
 
-    /// The same where the inverse of the direction is known; what it says of axes other than the longest does not matter.
+    /// A ray made ready as by [`Self::new`], where the inverse of the direction is known; what it says of axes other
+    /// than the longest does not matter.
     #[inline]
     pub(super) fn with_inverse(origin: Vec3A, direction: Vec3A, inverse: [f32; 3]) -> Self {
         let d = direction.to_array();
@@ -109,11 +111,12 @@ impl ShearedRay {
         Some(TriangleHit { t, b1: v * inverse, b2: w * inverse })
     }
 
-    /// The ray parameter at which the ray meets the plane of a triangle; `None` where that is not ahead, or the ray runs along the plane.
+    /// The ray parameter at which the ray meets the plane of a triangle; `None` where that is not ahead, or the
+    /// ray runs along the plane.
     ///
-    /// In f64, for hits that are near ([`NEAR`]): the corners' distances by their weights are off by f32's rounding times l²/w for a triangle of
-    /// length l and width w, so that a plank of 200:1 shadowed itself and lost 8 % of a furnace's light. For all hits it would take 15 % of
-    /// the Cornell box's time.
+    /// In f64, for hits that are near ([`NEAR`]): the corners' distances by their weights are off by f32's rounding
+    /// times l²/w for a triangle of length l and width w, so that a plank of 200:1 would shadow itself and lose 8 % of
+    /// a furnace's light. For all hits it would take 15 % of the Cornell box's time.
     #[inline]
     pub(super) fn distance_to_plane(&self, triangle: &[[f32; 3]; 3]) -> Option<f32> {
         let [a, b, c] = triangle.map(|corner| self.axes.map(|axis| f64::from(corner[axis])));

@@ -1,9 +1,10 @@
 //! An eight-wide tree over triangles: what obvhs builds, cut and walked by us.
 //!
-//! A node holds the boxes of eight children, each plane of the eight side by side, so that one ray is tested against all
-//! of them at once; a leaf is one block of up to [`LANES`] triangles in the same arrangement. The nearest child is entered
-//! first. Two walks with the same arithmetic in the same order, one for AVX2 and one for any machine, give equal bytes
-//! (`simd`); of hits at the same distance the smaller [`TriangleRef`] stands, so that the order of the walk does not show.
+//! A node holds the boxes of eight children, each plane of the eight side by side, so that one ray is tested
+//! against all of them at once; a leaf is one block of up to [`LANES`] triangles in the same arrangement. The
+//! nearest child is entered first. Two walks with the same arithmetic in the same order, one for AVX2 and one for
+//! any machine, give equal bytes (`simd`); of hits at the same distance the smaller [`TriangleRef`] stands, so that
+//! the order of the walk does not show.
 //!
 //! Not for primitives other than triangles, nor for a handful of them: the binary tree ([`super::tree`]) serves those.
 
@@ -52,7 +53,8 @@ impl Child {
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Node {
-    /// Low x, high x, low y, high y, low z, high z. Children that are not there have boxes that no ray of numbers meets.
+    /// Low x, high x, low y, high y, low z, high z. Children that are not there have boxes that no ray of numbers
+    /// meets.
     pub(super) planes: [[f32; LANES]; 6],
     pub(super) children: [Child; LANES],
 }
@@ -84,7 +86,7 @@ impl Node {
 #[derive(Clone, Debug)]
 #[repr(C, align(32))]
 pub(super) struct Block {
-    /// By axis, then vertex, then lane. Lanes without a triangle are NaN, which no test accepts.
+    /// Corners by axis, then vertex, then lane. Lanes without a triangle are NaN, which no test accepts.
     pub(super) corners: [[[f32; LANES]; 3]; 3],
 }
 
@@ -103,8 +105,8 @@ pub(super) struct BoxRay {
     pub(super) origin: [f32; 3],
     /// Inverse direction.
     pub(super) inverse: [f32; 3],
-    /// The same a little longer, so that rounding never closes a box that the exact ray meets: two distances have three
-    /// roundings each, 6 · 2⁻²⁴ = 3.6e-7 (Ize, "Robust BVH Ray Traversal", JCGT 2013).
+    /// Inverse direction, a little longer, so that rounding never closes a box that the exact ray meets: two distances
+    /// have three roundings each, 6 · 2⁻²⁴ = 3.6e-7 (Ize, "Robust BVH Ray Traversal", JCGT 2013).
     pub(super) inverse_far: [f32; 3],
     /// Rows of [`Node::planes`] that the ray meets first, by axis.
     pub(super) near: [usize; 3],
@@ -165,7 +167,7 @@ pub(super) struct WideHit {
     pub(super) hit: TriangleHit,
 }
 
-/// See the module.
+/// An eight-wide tree over triangles, as the module describes it.
 pub(super) struct WideTree {
     nodes: Vec<Node>,
     blocks: Vec<Block>,
@@ -200,7 +202,8 @@ impl WideTree {
         tree
     }
 
-    /// Which triangle is at a [`WideHit::place`]. Read once a ray, not once a candidate: in a large tree that is a wait for memory.
+    /// Which triangle is at a [`WideHit::place`]. Read once a ray, not once a candidate: in a large tree that is a wait
+    /// for memory.
     #[inline]
     pub(super) fn reference(&self, place: u32) -> TriangleRef {
         self.references[place as usize]
@@ -288,7 +291,8 @@ mod tests {
         [hit.t, hit.b1, hit.b2].map(f32::to_bits)
     }
 
-    /// A ray that is not a number is in every box, those of empty slots among them, which led back to the root: it took all memory.
+    /// A ray that is not a number is in every box, those of empty slots among them, which lead back to the root.
+    /// Regression: the walk took all memory.
     #[test]
     fn rays_without_numbers_end_and_hit_nothing() {
         let mut tree = build(&clutter());
@@ -302,8 +306,8 @@ mod tests {
         }
     }
 
-    /// Every set of instructions gives the same bytes as testing all triangles one by one does, of two equal hits the one
-    /// with the smaller number.
+    /// Every set of instructions gives the same bytes as testing all triangles one by one does, of two equal hits the
+    /// one with the smaller number.
     #[test]
     fn all_paths_equal_brute_force_to_the_bit() {
         let triangles = clutter();

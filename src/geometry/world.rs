@@ -314,8 +314,8 @@ struct Part {
 }
 
 impl Part {
-    /// A random number in [0, 1) that is a pure function of the ray and the part: the same ray always agrees with itself, and
-    /// parts behind one another know nothing of each other.
+    /// A random number in [0, 1) that is a pure function of the ray and the part: the same ray always agrees with
+    /// itself, and parts behind one another know nothing of each other.
     fn chance(self, ray: &Ray) -> f32 {
         let mut h = u64::from(self.object) << 32 | u64::from(self.number);
         for value in ray.origin.to_array().into_iter().chain(ray.direction.to_array()) {

@@ -7,8 +7,8 @@ use super::media::Media;
 use crate::geometry::{Ray, World};
 use glam::Vec2;
 
-/// Looks along a side of the picture, over the lens and over the shutter's time, where there is anything to look over. A boundary that
-/// passes between them is missed.
+/// Looks along a side of the picture, over the lens and over the shutter's time, where there is anything to look over.
+/// A boundary that passes between them is missed.
 const LOOKS: usize = 5;
 
 /// The volumes that camera rays begin in.
@@ -20,7 +20,8 @@ pub(super) enum AroundCamera {
 }
 
 impl AroundCamera {
-    /// For a picture of such a size in pixels; `moves`: whether anything does while the shutter is open.
+    /// What is around the camera for a picture of such a size in pixels; `moves`: whether anything does while the
+    /// shutter is open.
     pub(super) fn of(world: &World, camera: &CameraRays, size_px: Vec2, moves: bool) -> Self {
         let at = |sample: &CameraSample| Media::around(world, camera.ray(sample));
         let media = at(&CameraSample { position_px: 0.5 * size_px, lens: [0.5; 2], time: 0.0 });

@@ -37,12 +37,12 @@ pub struct CameraSample {
     pub time: f32,
 }
 
-/// Radii of lenses and distances of focus beyond this count as this, in scene units: their squares would be no numbers, and no ray would have
-/// a direction. The rays through a pixel are parallel to the last bit long before.
+/// Radii of lenses and distances of focus beyond this count as this, in scene units: their squares would be no numbers,
+/// and no ray would have a direction. The rays through a pixel are parallel to the last bit long before.
 const FARTHEST: f32 = 1e15;
 
 impl CameraRays {
-    /// For a picture of `width` × `height` pixels.
+    /// Camera rays for a picture of `width` × `height` pixels.
     pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
         let CameraAxes { forward, right, up } = camera.axes();
         let (half_height, parallel) = match camera.projection {
@@ -105,18 +105,19 @@ impl CameraRays {
         self.lens_right != Vec3::ZERO
     }
 
-    /// It at a share of the open shutter, in [0, 1].
+    /// The camera at a share of the open shutter, in [0, 1].
     pub(super) fn at(&self, time: f32) -> CameraAt<'_> {
         CameraAt::new(self, time)
     }
 
-    /// Place in the picture, in pixels, of a world position seen from the middle of the lens as the shutter opens; `None` at and behind the lens.
+    /// Place in the picture, in pixels, of a world position seen from the middle of the lens as the shutter opens;
+    /// `None` at and behind the lens.
     pub fn project(&self, position: Vec3) -> Option<Vec2> {
         self.at(0.0).project(position)
     }
 
-    /// Place in the picture, in pixels, of what is infinitely far in a world direction; `None` beside and behind the lens,
-    /// and where rays are parallel.
+    /// Place in the picture, in pixels, of what is infinitely far in a world direction; `None` beside and behind the
+    /// lens, and where rays are parallel.
     pub fn project_direction(&self, direction: Vec3) -> Option<Vec2> {
         self.at(0.0).project_direction(direction)
     }
@@ -164,7 +165,8 @@ mod tests {
         assert!(left.distance(Vec3::new(-2.0, 0.0, -1.0).normalize()) < 1e-6);
     }
 
-    /// A distance whose square is no number, as old files have for "never", left all rays without a direction; so did such a lens.
+    /// A distance whose square is no number, as old files have for "never", left all rays without a
+    /// direction; so did such a lens.
     #[test]
     fn rays_have_directions_however_far_the_focus_is() {
         for (aperture_radius, focus_distance) in [(0.0, 1e30), (0.1, f32::MAX), (1e37, 4.0), (f32::MAX, f32::MAX)] {
@@ -219,8 +221,8 @@ mod tests {
         }
     }
 
-    /// Whichever point of the lens a ray comes through, what it meets is projected to where it came from, as far from the middle as
-    /// the circle of confusion is wide for that point.
+    /// Whichever point of the lens a ray comes through, what it meets is projected to where it came from, as far from
+    /// the middle as the circle of confusion is wide for that point.
     #[test]
     fn projection_undoes_rays_through_the_lens() {
         let parallel = Camera { projection: Projection::Orthographic { height: 2.0 }, ..camera(0.5) };

@@ -1,4 +1,5 @@
-//! The frame at a surface point: its normal with relief and as the viewer can see it, and the tangent of stretched facets.
+//! The frame at a surface point: its normal with relief and as the viewer can see it, and the tangent of stretched
+//! facets.
 
 use super::{PathTracer, relief};
 use crate::geometry::SurfacePoint;
@@ -8,16 +9,17 @@ use glam::{Mat3, Vec3};
 
 /// The frame in which a BSDF works, and what else it has to know of normals.
 pub(super) struct Frames {
-    /// Of the coat where that has a normal of its own, else of all.
+    /// Frame of the coat where that has a normal of its own, else of all layers.
     pub(super) frame: Frame,
-    /// From there to what lies beneath such a coat.
+    /// Rotation from [`Self::frame`] to the frame of what lies beneath such a coat.
     pub(super) beneath_coat: Option<Mat3>,
-    /// Of what has the material's relief.
+    /// Normal of what has the material's relief.
     pub(super) normal: Vec3,
 }
 
 impl PathTracer {
-    /// The frames at a point, seen from the direction `wo` (world, unit, away from the surface) at a share of the open shutter.
+    /// The frames at a point, seen from the direction `wo` (world, unit, away from the surface) at a share of the open
+    /// shutter.
     #[inline(always)]
     pub(super) fn frames(&self, point: &SurfacePoint, wo: Vec3, time: f32) -> Frames {
         let scene = self.world.scene();
@@ -91,9 +93,9 @@ fn is_diffuse(surface: &Surface) -> bool {
     }
 }
 
-/// A shading normal, seen from `wo`, about which a mirror reflects the viewer away from the face: one about which it would not is turned
-/// until it just does (Keller and others, "The Iray Light Transport Simulation and Rendering System", 2017), since what goes below the face
-/// is lost.
+/// A shading normal, seen from `wo`, about which a mirror reflects the viewer away from the face: one about which it
+/// would not is turned until it just does (Keller and others, "The Iray Light Transport Simulation and Rendering
+/// System", 2017), since what goes below the face is lost.
 #[inline]
 fn mirroring_outwards(normal: Vec3, geometric_normal: Vec3, wo: Vec3) -> Vec3 {
     let (height_of_viewer, cosine) = (wo.dot(geometric_normal), wo.dot(normal));
@@ -107,7 +109,8 @@ fn mirroring_outwards(normal: Vec3, geometric_normal: Vec3, wo: Vec3) -> Vec3 {
     mirroring_at(least_height, mirrored - height * geometric_normal, geometric_normal, wo)
 }
 
-/// The normal about which a mirror reflects `wo` to this height over the face, in the plane of the face's normal and a vector along the face.
+/// The normal about which a mirror reflects `wo` to this height over the face, in the plane of the face's normal
+/// and a vector along the face.
 #[cold]
 fn mirroring_at(height: f32, along_face: Vec3, geometric_normal: Vec3, wo: Vec3) -> Vec3 {
     let Some(along_face) = along_face.try_normalize() else { return geometric_normal };

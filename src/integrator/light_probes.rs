@@ -1,4 +1,5 @@
-//! Places that paths get to, and what light comes there: asked before any sample is taken, so that samples choose lights by it.
+//! Places that paths get to, and what light comes there: asked before any sample is taken, so that samples choose
+//! lights by it.
 
 use super::shading::Components;
 use super::thin_sheets::MOST_SHEETS;

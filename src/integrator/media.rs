@@ -1,15 +1,16 @@
 //! What a ray travels in: the volumes that a path has entered and not yet left, and what they absorb (Beer–Lambert).
 //!
-//! A boundary pushes its inside when the path enters it from the front and takes it away again when the path leaves. A volume
-//! is known by its material, so that its boundary may be made of several objects; the innermost one absorbs. Thin sheets
-//! have no inside. What the camera is in is asked by rays from it out of the scene. A path that meets a boundary from behind
-//! without having entered it came in through a face that belongs to another volume: the way to that boundary is inside it.
+//! A boundary pushes its inside when the path enters it from the front and takes it away again when the path leaves. A
+//! volume is known by its material, so that its boundary may be made of several objects; the innermost one absorbs.
+//! Thin sheets have no inside. What the camera is in is asked by rays from it out of the scene. A path that meets a
+//! boundary from behind without having entered it came in through a face that belongs to another volume: the way to
+//! that boundary is inside it.
 //!
-//! Not for volumes that touch: a ray that crosses one of two faces in the same place is past the other. They must be a little apart or
-//! overlap, as of glass and what is in it.
+//! Not for volumes that touch: a ray that crosses one of two faces in the same place is past the other. They must be a
+//! little apart or overlap, as of glass and what is in it.
 //!
-//! Source: A. Beer (1852); nesting as in C. Schmidt & B. Budge, *Simple nested dielectrics in ray traced images* (2002),
-//! without priorities, since our boundaries carry the index of both sides.
+//! Source: A. Beer (1852); nesting as in C. Schmidt & B. Budge, *Simple nested dielectrics in ray traced images*
+//! (2002), without priorities, since our boundaries carry the index of both sides.
 
 use crate::geometry::{Ray, World};
 use crate::scene::{MaterialId, Surface};
@@ -59,9 +60,9 @@ pub(super) struct Media {
 /// Which way a path crosses a boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Crossing {
-    /// From its front.
+    /// The path enters, from the boundary's front.
     In,
-    /// From its back.
+    /// The path leaves, from the boundary's back.
     Out,
 }
 
@@ -92,8 +93,9 @@ impl Media {
         }
     }
 
-    /// The volumes around the beginning of a camera ray at its time: those whose boundaries a ray leaves without having entered them, as most
-    /// of seven rays say. One alone may pass where two volumes touch, or the back of a sheet, and took such a picture for one from inside.
+    /// The volumes around the beginning of a camera ray at its time: those whose boundaries a ray leaves without having
+    /// entered them, as most of seven rays say. One alone may pass where two volumes touch, or the back of a sheet, and
+    /// took such a picture for one from inside.
     pub(super) fn around(world: &World, ray: Ray) -> Self {
         // In no plane that people build by.
         const OTHERS: [[f32; 3]; 6] = [
@@ -151,7 +153,7 @@ impl Media {
         self.innermost().map_or(Vec3::ONE, |medium| medium.transmittance(distance))
     }
 
-    /// The same along a way that ends at the back of the boundary of `medium`.
+    /// Share of light that is left along a free way of such a length that ends at the back of the boundary of `medium`.
     pub(super) fn transmittance_to_back_of(&self, medium: Medium, distance: f32) -> Vec3 {
         let entered = self.entered[..self.count].iter().flatten().any(|entered| entered.material == medium.material);
         if entered { self.transmittance(distance) } else { medium.transmittance(distance) }
@@ -195,7 +197,8 @@ mod tests {
         assert_eq!(media.transmittance(0.5), Vec3::ONE);
     }
 
-    /// Two absorbing boxes that touch: a ray through the face between them meets one of two boundaries, and seven know better.
+    /// Two absorbing boxes that touch: a ray through the face between them meets one of two boundaries, and seven know
+    /// better.
     #[test]
     fn a_camera_before_touching_volumes_is_in_none() {
         let scene = |boxes: &str| {

@@ -59,7 +59,7 @@ impl PathSample {
 /// Where a path is.
 pub(super) struct PathState {
     pub(super) ray: Ray,
-    /// Its numbers.
+    /// Numbers that the path draws.
     pub(super) sample: Sample,
     /// Where the ray's direction was scattered: the last surface but for clear sheets.
     from: LightReceiver,
@@ -98,11 +98,11 @@ pub(super) struct BounceNumbers {
     pub(super) scatter: [f32; 4],
 }
 
-/// From a surface to a light.
+/// A ray from a surface to a light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShadowRay {
     pub(super) ray: Ray,
-    /// Up to the light, in scene units; may be infinite, and is 0 where there is no way between the two.
+    /// Distance up to the light, in scene units; may be infinite, and is 0 where there is no way between the two.
     pub(super) distance: f32,
 }
 
@@ -116,7 +116,7 @@ struct DirectLight {
 }
 
 impl PathState {
-    /// At the lens.
+    /// A path that begins at the lens.
     pub(super) fn new(camera_ray: Ray, sample: Sample, media: Media) -> Self {
         Self {
             ray: camera_ray,
@@ -171,7 +171,8 @@ impl PathTracer {
         }
     }
 
-    /// Gathers the light of the surface that the path's ray has hit and chooses the next ray; false where the path ends.
+    /// Gathers the light of the surface that the path's ray has hit and chooses the next ray; false where the path
+    /// ends.
     #[inline(always)]
     pub(super) fn shade(
         &self,
@@ -181,18 +182,22 @@ impl PathTracer {
         bounce: u32,
         numbers: &BounceNumbers,
     ) -> bool {
+        // What the surface is made of here.
         let wo = -Vec3::from(path.ray.direction);
         let components = Components::new();
         let frames = self.frames(point, wo, path.ray.time);
         let bsdf = self.bsdf(point, &frames, &components);
         let shading = self.shading(&bsdf, point, &frames);
+        // Absorption since the last surface.
         path.throughput *= match shading.medium {
             Some(medium) if wo.dot(point.geometric_normal) < 0.0 => {
                 path.media.transmittance_to_back_of(medium, hit.distance)
             }
             _ => path.media.transmittance(hit.distance),
         };
+        // Emission, weighed by multiple importance sampling.
         let emitted = self.add_emission(path, hit, point);
+        // What the first surface is like.
         if bounce == 0 {
             let albedo = shading.bsdf.albedo(shading.frame.to_local(wo)).clamp(Vec3::ZERO, Vec3::ONE);
             path.first_hit = FirstHit {
@@ -203,12 +208,15 @@ impl PathTracer {
                 shines: emitted,
             };
         }
+        // The last surface of a path that is as deep as it may be.
         if bounce >= self.settings.max_depth {
             return false;
         }
+        // Next-event estimation.
         if shading.bsdf.has_smooth_lobe() {
             self.sample_light(path, point, &shading, wo, bounce, numbers.light);
         }
+        // Scattering and roulette.
         let [u0, u1, lobe, roulette] = numbers.scatter;
         scatter(path, hit, point, &shading, wo, [u0, u1, lobe]) && survives(path, bounce, roulette)
     }
@@ -264,8 +272,8 @@ impl PathTracer {
         radiance != Vec3::ZERO
     }
 
-    /// Next-event estimation: light that arrives straight from a sampled light unless something hides it. It is made in its place:
-    /// handing it back took 3 % of the Cornell box.
+    /// Next-event estimation: light that arrives straight from a sampled light unless something hides it. It is made in
+    /// its place: to hand it back takes 3 % of the Cornell box's time.
     fn sample_light(
         &self,
         path: &mut PathState,
@@ -275,11 +283,13 @@ impl PathTracer {
         bounce: u32,
         u: [f32; 4],
     ) {
+        // A place on a light.
         let [u0, u1, choice, roulette] = u;
         let receiver = shading.receiver(point, wo);
         let Some(light) = self.lights.sample(&self.world, &receiver, path.ray.time, [u0, u1, choice]) else {
             return;
         };
+        // What the surface scatters of its light.
         let wi = light.direction;
         if !shading.sides_agree(wo, wi) {
             return;
@@ -288,9 +298,11 @@ impl PathTracer {
         if scattered.value == Vec3::ZERO {
             return;
         }
+        // Its weight against scattering, which may find the same light.
         let scatter_pdf = if light.is_delta { 0.0 } else { scattered.pdf };
         let weight = power_heuristic_over_own(light.pdf, scatter_pdf);
         let unshadowed = path.throughput * scattered.value * light.radiance * weight;
+        // Roulette by how much it would add to what the path has found.
         let survival = self.thresholds.as_ref().map_or(1.0, |thresholds| {
             let of = |rgb: Vec3| luminance(rgb.to_array());
             thresholds.survival(of(unshadowed * path.radiance_gain_on_exit), of(path.radiance))
@@ -298,6 +310,7 @@ impl PathTracer {
         if survival < 1.0 && roulette >= survival {
             return;
         }
+        // Absorption on the way to the light.
         let distance = light.place.map_or(f32::INFINITY, |place| place.position.distance(point.position));
         let left = match shading.crossed_medium(wo, wi) {
             None => path.media.transmittance(distance),
@@ -307,6 +320,7 @@ impl PathTracer {
                 media.transmittance(distance)
             }
         };
+        // The shadow ray that it waits for.
         let shadow_ray = self.shadow_ray(point, &light, path.ray.time);
         let most_sheets = if self.has_sheets { MOST_SHEETS.min(self.settings.max_depth - bounce - 1) } else { 0 };
         path.direct = Some(DirectLight { shadow_ray, most_sheets, radiance: unshadowed * left / survival });
@@ -348,8 +362,8 @@ fn scatter(path: &mut PathState, hit: &Hit, point: &SurfacePoint, shading: &Shad
     if let Some(index) = scattered.crossed_index {
         path.radiance_gain_on_exit *= index * index;
     }
-    // Whatever the lobe: what a mix lets through diffusely comes into the volume behind it like what it refracts, and a light
-    // sample cannot tell the two apart.
+    // Whatever the lobe: what a mix lets through diffusely comes into the volume behind it like what it refracts, and a
+    // light sample cannot tell the two apart.
     if let Some(crossed) = shading.crossed_medium(wo, wi) {
         path.media.cross(crossed);
     }
@@ -360,8 +374,8 @@ fn scatter(path: &mut PathState, hit: &Hit, point: &SurfacePoint, shading: &Shad
     path.throughput.max_element() > 0.0 && path.throughput.is_finite()
 }
 
-/// Goes on behind a clear sheet. A lamp that is met there is weighed as seen from where the direction was scattered, since a shadow
-/// ray from there might have found it as well: see [`super::thin_sheets`].
+/// Goes on behind a clear sheet. A lamp that is met there is weighed as seen from where the direction was scattered,
+/// since a shadow ray from there might have found it as well: see [`super::thin_sheets`].
 fn pass_sheet(path: &mut PathState, hit: &Hit, point: &SurfacePoint, share: Vec3) -> bool {
     path.throughput *= share;
     path.behind.distance += hit.distance;

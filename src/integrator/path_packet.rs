@@ -1,8 +1,8 @@
 //! A packet of paths, followed abreast: one stage of all of them before the next stage of any.
 //!
-//! Corners and texels of what a path hits are in no cache where a scene is large. So each stage asks for what the next one reads,
-//! and the memory answers while the other paths' part of the stage is done. Which paths go abreast changes no byte of any, and
-//! a block is summed in the order of its samples.
+//! Corners and texels of what a path hits are in no cache where a scene is large. So each stage asks for what the next
+//! one reads, and the memory answers while the other paths' part of the stage is done. Which paths go abreast changes
+//! no byte of any, and a block is summed in the order of its samples.
 
 use super::path::{BounceNumbers, PathState};
 use super::{BlockWork, CameraSample, PathTracer, log2_block};
@@ -12,8 +12,8 @@ use crate::sampler::{BlockKey, Pixel, Purpose, Sample};
 use glam::Vec2;
 use smallvec::SmallVec;
 
-/// Paths abreast: the cave of `benches/paths.rs` has 0.307 M samples a second with 16, 0.309 with 32 and 64, 0.306 with the 8
-/// of one block at a time.
+/// Paths abreast: the cave of `benches/paths.rs` has 0.307 M samples a second with 16, 0.309 with 32 and 64, 0.306 with
+/// the 8 of one block at a time.
 const PATHS: usize = 16;
 
 /// Samples of the paths of a packet.

@@ -1,9 +1,10 @@
 //! Roulette of light that could not be seen beside what its path has found already.
 //!
-//! "If an intensity change is below threshold, do not render it" is an old idea for saving rays (with the threshold of the eye as a
-//! function of the luminance that it is adapted to). Left out, such light would be missing; traced by chance in proportion and weighted by
-//! the inverse, it is not. Only light straight from lamps is tried: how much a further bounce will bring nobody knows, and the roulette
-//! of whole paths by throughput is many times stricter than a threshold of five per cent.
+//! "If an intensity change is below threshold, do not render it" is an old idea for saving rays (with the threshold of
+//! the eye as a function of the luminance that it is adapted to). Left out, such light would be missing; traced by
+//! chance in proportion and weighted by the inverse, it is not. Only light straight from lamps is tried: how much a
+//! further bounce will bring nobody knows, and the roulette of whole paths by throughput is many times stricter than a
+//! threshold of five per cent.
 //!
 //! Not for speed: see `benches/results/transport.md`.
 

@@ -1,11 +1,12 @@
-//! Shading normals under normal and height maps.
+//! Shading normals under normal and height maps. The surface itself stays as it is: nothing is displaced.
 
 use crate::geometry::surface::{Frame, SurfaceDerivatives};
 use crate::geometry::{SurfacePoint, World};
 use crate::scene::{HeightMap, HeightUnit, Relief, Texture, TextureLookup};
 use glam::{Vec2, Vec3};
 
-/// The shading normal under a relief at a point at a share of the open shutter: unit, on the mesh's shading normal's side.
+/// The shading normal under a relief at a point at a share of the open shutter: unit, on the mesh's shading normal's
+/// side.
 pub(super) fn shading_normal(world: &World, relief: Option<&Relief>, point: &SurfacePoint, time: f32) -> Vec3 {
     let textures = &world.scene().textures;
     match relief {
@@ -43,11 +44,12 @@ fn unit_height(heights: &HeightMap, surface: &SurfaceDerivatives) -> f32 {
     }
 }
 
-/// The normal of a surface that is raised along its `normal` by a height of this `gradient` over (u, v), in world units.
+/// The normal of a surface that is raised along its `normal` by a height of this `gradient` over (u, v), in world
+/// units.
 ///
-/// Blinn 1978, as the gradient ∇h in the plane of the normal with ∇h · ∂p/∂u = ∂h/∂u and ∇h · ∂p/∂v = ∂h/∂v
-/// (Mikkelsen 2010): the normal is n − ∇h. The height itself is taken to be small beside the surface's radius of curvature.
-/// Where u and v do not span a surface, or a slope is beyond floats, the normal stays.
+/// Blinn 1978, as the gradient ∇h in the plane of the normal with ∇h · ∂p/∂u = ∂h/∂u and ∇h · ∂p/∂v = ∂h/∂v (Mikkelsen
+/// 2010): the normal is n − ∇h. The height itself is taken to be small beside the surface's radius of curvature. Where
+/// u and v do not span a surface, or a slope is beyond floats, the normal stays.
 fn tilted(normal: Vec3, surface: &SurfaceDerivatives, gradient: Vec2) -> Vec3 {
     let (across_u, across_v) = (surface.along_v.cross(normal), normal.cross(surface.along_u));
     let area = surface.along_u.dot(across_u);
@@ -70,7 +72,8 @@ mod tests {
         }
     }
 
-    /// The surface (x, y, h(x, y)) has its normal along (−h_x, −h_y, 1), however u and v lie in it: oblique, stretched, mirrored.
+    /// The surface (x, y, h(x, y)) has its normal along (−h_x, −h_y, 1), however u and v lie in it: oblique, stretched,
+    /// mirrored.
     #[test]
     fn coordinates_do_not_matter() {
         let slopes = Vec2::new(0.7, -0.3);

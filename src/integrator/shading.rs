@@ -17,10 +17,10 @@ use std::cell::{Cell, OnceCell};
 
 /// A BSDF and the frame in which it works.
 pub(super) struct Shading<'a> {
-    /// Stays where it was made: it takes hundreds of bytes, and moving them took 3 % of the Cornell box.
+    /// Stays where it was made: it takes hundreds of bytes, and to move them takes 3 % of the Cornell box's time.
     pub(super) bsdf: &'a Bsdf<'a>,
     pub(super) frame: Frame,
-    /// Of what has the material's relief: a smooth coat over it shows less of what is there.
+    /// Normal of what has the material's relief: a smooth coat over it shows less of what is there.
     pub(super) normal: Vec3,
     pub(super) geometric_normal: Vec3,
     /// Whether light can come from the other side.
@@ -29,7 +29,8 @@ pub(super) struct Shading<'a> {
     pub(super) medium: Option<Medium>,
 }
 
-/// Components of a mix, two for each of its nodes: a place to stay for what the mix refers to, on the stack of the path.
+/// Components of a mix, two for each of its nodes: a place to stay for what the mix refers to, on the stack of the
+/// path.
 pub(super) struct Components<'a> {
     cells: [OnceCell<Bsdf<'a>>; 2 * (Surface::MOST_COMPONENTS - 1)],
     used: Cell<usize>,
@@ -37,7 +38,8 @@ pub(super) struct Components<'a> {
 
 impl<'a> Components<'a> {
     pub(super) fn new() -> Self {
-        // Not `[const { .. }; N]`: that copies kilobytes of empty cells at every hit, which took 17 % of the Cornell box.
+        // Not `[const { .. }; N]`: that copies kilobytes of empty cells at every hit, which takes 17 % of the Cornell
+        // box's time.
         Self { cells: std::array::from_fn(|_| OnceCell::new()), used: Cell::new(0) }
     }
 
@@ -59,8 +61,8 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// A share of light in [0, 1]: pictures and their factors may go beyond, and what reflects more than comes in, or less than
-    /// nothing, breaks every model.
+    /// A share of light in [0, 1]: pictures and their factors may go beyond, and what reflects more than comes in, or
+    /// less than nothing, breaks every model.
     fn color(&self, input: &ColorInput) -> Vec3 {
         input.evaluate(self.textures, self.uv).clamp(Vec3::ZERO, Vec3::ONE)
     }
@@ -201,8 +203,8 @@ impl Shading<'_> {
         LightReceiver { position: point.position, normal }
     }
 
-    /// The volume whose boundary a path crosses that came along `wo` and goes on along `wi`, and which way; `None` where
-    /// it stays on its side, or no volume absorbs.
+    /// The volume whose boundary a path crosses that came along `wo` and goes on along `wi`, and which way; `None`
+    /// where it stays on its side, or no volume absorbs.
     pub(super) fn crossed_medium(&self, wo: Vec3, wi: Vec3) -> Option<Crossed> {
         let medium = self.medium?;
         let (from_front, to_front) = (wo.dot(self.geometric_normal) > 0.0, wi.dot(self.geometric_normal) > 0.0);

@@ -1,9 +1,11 @@
-//! How much of each pixel's samples meets things that the camera sees smaller, or thinner, than a pixel, smaller than its lens blurs them, or
-//! passing by while the shutter is open: lamps, and what others light where it is unlike all around it.
+//! How much of each pixel's samples meets things that the camera sees smaller, or thinner, than a pixel,
+//! smaller than its lens blurs them, or passing by while the shutter is open: lamps, and what others light
+//! where it is unlike all around it.
 //!
-//! The first samples of a pixel may all pass them by, and then nothing in the picture tells of them; but where things are is known.
-//! Not for what is found without it: things that cover a pixel whole, of which the neighbours tell; but each triangle of a lamp is judged by
-//! itself, so that the rim of a large lamp of small triangles has these samples, too. Nor is anything looked for by mirrors or through glass.
+//! The first samples of a pixel may all pass them by, and then nothing in the picture tells of them; but where things
+//! are is known. Not for what is found without it: things that cover a pixel whole, of which the neighbours tell; but
+//! each triangle of a lamp is judged by itself, so that the rim of a large lamp of small triangles has these samples,
+//! too. Nor is anything looked for by mirrors or through glass.
 
 mod border;
 mod lit;
@@ -22,7 +24,8 @@ use lit::BrightSpot;
 use shares::{Piece, Shares};
 use spots::{Spot, Spots};
 
-/// Spots that are looked for, and rays that look for them: each from fewer points of the lens where there are many. The rest is left to chance.
+/// Spots that are looked for, and rays that look for them: each from fewer points of the lens where there are many.
+/// The rest is left to chance.
 const MOST_RAYS: usize = 1 << 18;
 /// Pixels that spots are spread over, one after the other, some 0.2 s. The rest is left to chance.
 const MOST_PIXELS: f64 = (1 << 26) as f64;
@@ -75,7 +78,7 @@ struct Part {
 /// How bright something is.
 #[derive(Clone, Copy)]
 enum Shine {
-    /// So much luminance all over, scene units.
+    /// A luminance that is the same all over, scene units.
     Known(f32),
     /// As bright as this object is there.
     Of(u32),
@@ -197,7 +200,8 @@ impl PathTracer {
     }
 }
 
-/// So many points of the lens, by their [`CameraSample::lens`], from which a spot is looked for; others for another `first`.
+/// So many points of the lens, by their [`CameraSample::lens`], from which a spot is looked for; others for another
+/// `first`.
 ///
 /// [`CameraSample::lens`]: super::camera::CameraSample::lens
 fn lens_points(spot: &Spot, first: usize, count: usize) -> Vec<[f32; 2]> {

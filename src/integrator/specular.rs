@@ -15,9 +15,9 @@ const MOST_VERTICES: usize = 8;
 /// What a perfectly smooth surface does with a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpecularEvent {
-    /// As a mirror does.
+    /// The ray is reflected, as by a mirror.
     Reflected,
-    /// As glass does.
+    /// The ray is transmitted, as by glass.
     Transmitted,
 }
 
@@ -35,13 +35,15 @@ pub struct SpecularVertex {
 pub struct SpecularPath {
     /// The surfaces in order, at least one.
     pub vertices: SmallVec<[SpecularVertex; 2]>,
-    /// From the last of them.
+    /// The ray that leaves the last of the surfaces.
     pub last_ray: Ray,
     /// What that ray meets; `None` where it leaves the scene.
     pub end: Option<Hit>,
-    /// From the camera to the end over all surfaces; infinite where the last ray leaves the scene.
+    /// Length of the way from the camera to the end over all surfaces, scene units; infinite where the last ray leaves
+    /// the scene.
     pub length: f32,
-    /// Turns directions along the last ray into those in which plane mirrors in place of its surfaces show them; glass turns none.
+    /// Turns directions along the last ray into those in which plane mirrors in place of its surfaces show them; glass
+    /// turns none.
     pub unfolded: Mat3A,
 }
 
@@ -57,8 +59,8 @@ impl PathTracer {
         self.world.scene().materials.iter().any(|material| may_be_specular(&material.surface))
     }
 
-    /// Follows a camera ray over mirrors and glass, by the likelier event at each. `None` where the first thing in its way is
-    /// neither, or there are more than eight.
+    /// Follows a camera ray over mirrors and glass, by the likelier event at each. `None` where the first thing in its
+    /// way is neither, or there are more than eight.
     pub fn follow_specular(&self, camera_ray: Ray) -> Option<SpecularPath> {
         let (mut ray, mut length, mut vertices) = (camera_ray, 0.0, SmallVec::new());
         let mut unfolded = Mat3A::IDENTITY;
@@ -83,8 +85,8 @@ impl PathTracer {
         }
     }
 
-    /// Follows a ray over the same things by the same events; the ray that leaves the last of them. `None` where it meets
-    /// something else in place of one of them, or cannot go on as asked, as under total reflection.
+    /// Follows a ray over the same things by the same events; the ray that leaves the last of them. `None` where it
+    /// meets something else in place of one of them, or cannot go on as asked, as under total reflection.
     pub fn follow_again(&self, camera_ray: Ray, vertices: &[SpecularVertex]) -> Option<Ray> {
         vertices.iter().try_fold(camera_ray, |ray, vertex| {
             let hit = self.world.closest(&ray).filter(|hit| hit.object == vertex.object)?;
@@ -92,8 +94,8 @@ impl PathTracer {
         })
     }
 
-    /// What the surface at a hit does with a ray if it is perfectly smooth and does not shine: the event that is asked for, or
-    /// the likelier one.
+    /// What the surface at a hit does with a ray if it is perfectly smooth and does not shine: the event that is asked
+    /// for, or the likelier one.
     fn specular_bounce(&self, ray: &Ray, hit: &Hit, wanted: Option<SpecularEvent>) -> Option<SpecularBounce> {
         let material = self.world.material(hit.object);
         if !may_be_specular(&material.surface) || material.emission.factor != Vec3::ZERO {

@@ -1,4 +1,5 @@
-//! Tables that materials need, computed once before tracing and shared where parameters are equal.
+//! Tables that materials need, computed once before tracing and shared where parameters are equal. What is in them is
+//! left to `bsdf`.
 
 use crate::bsdf::{AnisotropicTable, CoatTables, DielectricTables, LayerTables, LayerWidths, WidthRange};
 use crate::scene::{Distribution, Material, Roughness, RoughnessScale, ScalarInput, Surface};
@@ -7,22 +8,23 @@ use std::sync::Arc;
 
 /// The tables of one surface.
 pub(super) enum SurfaceTables {
-    /// It needs none.
+    /// No tables: the surface needs none.
     None,
-    /// Of a metal of anisotropic roughness.
+    /// Tables of a metal of anisotropic roughness.
     Conductor(Box<AnisotropicTable>),
-    /// Of a rough dielectric.
+    /// Tables of a rough dielectric.
     Dielectric(Arc<DielectricTables>),
-    /// Of a coat over a diffuse base.
+    /// Tables of a coat over a diffuse base.
     Coat(Arc<CoatTables>),
-    /// Of a coat over a metal.
+    /// Tables of a coat over a metal.
     Layers(Arc<LayerTables>),
-    /// Of both components.
+    /// Tables of both components of a mix.
     Mix(Box<[SurfaceTables; 2]>),
 }
 
-/// Tables without which a surface cannot be evaluated. A surface and tables that [`of_materials`] did not make for it are a mistake
-/// in this crate, which no scene file can bring about: that ends the program rather than paint the surface black.
+/// Tables without which a surface cannot be evaluated. A surface and tables that [`of_materials`] did not
+/// make for it are a mistake in this crate, which no scene file can bring about: that ends the program rather
+/// than paint the surface black.
 impl SurfaceTables {
     pub(super) fn coat(&self) -> &CoatTables {
         let Self::Coat(tables) = self else { unreachable!("a coated diffuse surface has tables of its coat") };

@@ -1,10 +1,11 @@
 //! Clear sheets before lamps: window panes let the sun in.
 //!
-//! A pane in a shadow ray's way would keep the light out of it; only paths that happen to scatter towards the lamp would find it, and
-//! none would find a light without extent. What goes straight on through smooth thin sheets is therefore let through here. A path that
-//! has gone straight on through sheets and meets a lamp counts as scattered where its direction was, so that both ways of finding the
-//! lamp are weighed against each other as if the sheets were not there. Whether a path takes a sheet's other lobe does not enter the
-//! weights: they need only add up to 1. Not for boundaries of volumes, which refract.
+//! A pane in a shadow ray's way would keep the light out of it; only paths that happen to scatter towards the lamp
+//! would find it, and none would find a light without extent. What goes straight on through smooth thin sheets is
+//! therefore let through here. A path that has gone straight on through sheets and meets a lamp counts as scattered
+//! where its direction was, so that both ways of finding the lamp are weighed against each other as if the sheets were
+//! not there. Whether a path takes a sheet's other lobe does not enter the weights: they need only add up to 1. Not for
+//! boundaries of volumes, which refract.
 
 use super::PathTracer;
 use super::path::ShadowRay;
@@ -46,9 +47,9 @@ fn may_be_a_sheet(surface: &Surface) -> bool {
 /// What comes through sheets.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Passed {
-    /// Of light; 0 where anything else is in the way.
+    /// Share of light that comes through, by channel; 0 where anything else is in the way.
     pub(super) share: Vec3,
-    /// That it took to find out.
+    /// Rays that it took to find out.
     pub(super) rays: u32,
 }
 
@@ -73,7 +74,8 @@ impl PathTracer {
                 return Passed { share, rays };
             }
             ray.origin = point.spawn(-wo);
-            // Lifting the origin off the sheet moves the ray aside, and the lamp itself would be in its way: it is aimed anew.
+            // Lifting the origin off the sheet moves the ray aside, and the lamp itself would be in its way: it is
+            // aimed anew.
             if let Some(end) = end {
                 left = (end - ray.origin).length();
                 ray = Ray { time: ray.time, ..Ray::new(ray.origin, (end - ray.origin) / left) };

@@ -1,8 +1,8 @@
 //! Points of a parallelogram with a density that is bilinear between its corners.
 //!
-//! Where an emitter is a few times farther away than it is wide, what its points give to a receiver is nearly that: sampling by it
-//! leaves less variance than the uniform solid angle, which knows nothing of the receiver's cosine, and takes no trigonometric
-//! function. Not for emitters that are near: between the corners anything may happen.
+//! Where an emitter is a few times farther away than it is wide, what its points give to a receiver is nearly that:
+//! sampling by it leaves less variance than the uniform solid angle, which knows nothing of the receiver's cosine, and
+//! takes no trigonometric function. Not for emitters that are near: between the corners anything may happen.
 
 use super::lanes::FourVectors;
 use glam::{Vec3, Vec4};
@@ -20,9 +20,9 @@ pub(super) fn parallelogram_corners(corner: Vec3, edge_1: Vec3, edge_2: Vec3) ->
 }
 
 impl BilinearDensity {
-    /// In proportion to what an even emitter gives to a receiver of unit normal `normal` (zero if it receives from all sides):
-    /// cos θ at the receiver over the fourth power of the distance, since the cosine at the emitter is its plane's distance over
-    /// the point's. `corners` are as seen from the receiver.
+    /// A density in proportion to what an even emitter gives to a receiver of unit normal `normal` (zero if it receives
+    /// from all sides): cos θ at the receiver over the fourth power of the distance, since the cosine at the emitter is
+    /// its plane's distance over the point's. `corners` are as seen from the receiver.
     #[inline]
     pub(super) fn of_irradiance(corners: &FourVectors, normal: Vec3) -> Self {
         let squared = corners.dot_each(corners).max(Vec4::splat(f32::MIN_POSITIVE));
@@ -35,7 +35,8 @@ impl BilinearDensity {
         if !(most > 0.0 && most.is_finite()) {
             return Self { corners: Vec4::ONE };
         }
-        // What lies below the horizon at a corner may be above it beside the corner: no density falls far below the largest.
+        // What lies below the horizon at a corner may be above it beside the corner: no density falls far below the
+        // largest.
         const LEAST_SHARE: f32 = 0.1;
         Self { corners: (given / most).max(Vec4::splat(LEAST_SHARE)) }
     }

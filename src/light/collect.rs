@@ -26,7 +26,7 @@ impl Collected {
     }
 }
 
-/// Every emitter that has a place.
+/// Collects every emitter that has a place.
 pub(super) fn placed(world: &World) -> Collected {
     let scene = world.scene();
     let mut collected = Collected::default();

@@ -14,8 +14,8 @@ pub(super) struct DistantLights {
     choice: Distribution1d,
 }
 
-/// A light that looks smaller comes from one direction: f32 has too few directions within it, so that sampled ones fell outside (2 % of a
-/// disc of 6e-7 rad, 0.1 % of one of 9e-6).
+/// A light that looks smaller than this comes from one direction: f32 has too few directions within it, so that sampled
+/// ones fall outside (2 % of a disc of 6e-7 rad, 0.1 % of one of 9e-6).
 const SMALLEST_DISC_RAD: f32 = 5e-5;
 
 #[derive(Clone, Debug)]
@@ -31,13 +31,13 @@ struct DistantLight {
 pub(super) struct Disc {
     /// Unit vector towards its middle.
     pub(super) axis: Vec3,
-    /// Of half the angle that it fills.
+    /// Tangent of half the angle that the disc fills.
     pub(super) tangent: f32,
     pub(super) radiance: Vec3,
 }
 
 impl DistantLights {
-    /// `None` where no light shines from afar.
+    /// The distant lights among these; `None` where no light shines from afar.
     pub(super) fn new(lights: &[Light]) -> Option<Self> {
         let (mut distant, mut weights) = (Vec::new(), Vec::new());
         for light in lights {

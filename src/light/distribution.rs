@@ -1,6 +1,7 @@
-//! Piecewise-constant distributions, sampled by inversion.
+//! Piecewise-constant distributions, sampled by inversion. Not for distributions that change: all cells are
+//! added up when one is made.
 
-/// Over a row of cells in proportion to their weights.
+/// A distribution over a row of cells in proportion to their weights.
 #[derive(Clone, Debug)]
 pub(super) struct Distribution1d {
     /// `cumulative[i]` is the probability of the cells before i; one more entry than cells, the last is 1.
@@ -17,14 +18,14 @@ pub(super) struct ChosenCell {
 /// A place along a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlaceSample {
-    /// In [0, 1).
+    /// Place along the row in [0, 1).
     pub(super) place: f32,
     /// Relative to uniform.
     pub(super) density: f32,
 }
 
 impl Distribution1d {
-    /// `None` unless some weight is above 0 and all are finite.
+    /// A distribution in proportion to weights; `None` unless some weight is above 0 and all are finite.
     pub(super) fn new(weights: &[f64]) -> Option<Self> {
         let total: f64 = weights.iter().sum();
         if !(total > 0.0 && total.is_finite()) {

@@ -4,8 +4,9 @@ use crate::bsdf::passed_by_clearcoat;
 use crate::scene::{Alpha, Material, MetalRoughness, Surface, Texture};
 use glam::{Vec2, Vec3};
 
-/// Radiance at texture coordinates in a direction at this cosine, at least 0, to the geometric normal: what a clear coat turns back of
-/// it stays (KHR_materials_clearcoat). Not by the shading normal, which light sampling does not know.
+/// Radiance at texture coordinates in a direction at this cosine, at least 0, to the geometric normal: what a clear
+/// coat turns back of it stays (KHR_materials_clearcoat). Not by the shading normal, which light sampling does not
+/// know.
 pub fn emitted(material: &Material, textures: &[Texture], uv: Vec2, cosine: f32) -> Vec3 {
     let radiance = material.emission.evaluate(textures, uv);
     match material.surface.has_clearcoat() {

@@ -30,7 +30,7 @@ struct DirectionSample {
 }
 
 impl EnvironmentSampler {
-    /// `None` for one that is black.
+    /// A sampler of an environment; `None` for one that is black.
     pub(super) fn new(environment: &Environment) -> Option<Self> {
         let lit = environment.scale > 0.0 && environment.texels.iter().any(|texel| texel.max_element() > 0.0);
         lit.then(|| Self { environment: environment.clone(), cells: Cells::new(environment) })
@@ -63,8 +63,8 @@ impl EnvironmentSampler {
     }
 }
 
-/// The largest channel of what is seen around each texel, row-major: look-ups are bilinear, so each texel's weight covers its
-/// neighbours too.
+/// The largest channel of what is seen around each texel, row-major: look-ups are bilinear, so each texel's weight
+/// covers its neighbours too.
 fn texel_weights(environment: &Environment) -> Vec<f64> {
     let (width, height) = (i64::from(environment.width), i64::from(environment.height));
     let brightness = |x: i64, y: i64| f64::from(environment.texels[environment.texel_index(x, y)].max_element());

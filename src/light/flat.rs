@@ -1,6 +1,6 @@
-//! Triangles and parallelograms that emit. Triangles, and rectangles that may look larger than 1 sr, are sampled by solid angle; smaller
-//! rectangles and oblique parallelograms by area and what their corners give; specks of all three, and oblique parallelograms that may
-//! look larger, evenly by area.
+//! Triangles and parallelograms that emit. Triangles, and rectangles that may look larger than 1 sr, are sampled by
+//! solid angle; smaller rectangles and oblique parallelograms by area and what their corners give; specks of all three,
+//! and oblique parallelograms that may look larger, evenly by area.
 
 use super::bilinear::{BilinearDensity, parallelogram_corners};
 use super::emission::{emitted, even_radiance};
@@ -42,8 +42,8 @@ pub(super) struct FlatEmitter {
 /// Bound of the solid angle in steradian below which a parallelogram is sampled by its corners.
 const MOST_BILINEAR: f32 = 1.0;
 
-/// Corners that lie this near to each other, as a share of the triangle's size, are one; edges whose cosine is below it are at a right
-/// angle.
+/// Corners that lie this near to each other, as a share of the triangle's size, are one; edges whose cosine is
+/// below it are at a right angle.
 const ROUNDING: f32 = 1e-5;
 /// Least cosine between the normals of two triangles in one plane.
 const COPLANAR: f32 = 0.999_99;
@@ -79,7 +79,7 @@ pub(super) enum Winding {
 }
 
 impl Winding {
-    /// That of a mesh's triangles where a transform has put them, which may mirror.
+    /// Winding of a mesh's triangles where a transform has put them, which may mirror.
     pub(super) fn after(to_world: &Affine3A) -> Self {
         if to_world.matrix3.determinant() < 0.0 { Self::Clockwise } else { Self::CounterClockwise }
     }
@@ -125,7 +125,8 @@ impl FlatEmitter {
         }
     }
 
-    /// Both triangles as one, if they are the halves a, b, c and a, c, d of a parallelogram that emits evenly.
+    /// Merges two triangles into one emitter, if they are the halves a, b, c and a, c, d of a parallelogram that emits
+    /// evenly.
     pub(super) fn merged(&self, next: &Self, scene: &Scene) -> Option<Self> {
         let tolerance = ROUNDING * (self.edge_1.abs() + self.edge_2.abs()).max_element();
         let near = |a: Vec3, b: Vec3| (a - b).abs().max_element() <= tolerance;
@@ -163,7 +164,7 @@ impl FlatEmitter {
         })
     }
 
-    /// Its corners, for bounds: some come twice.
+    /// Corners of the emitter, for bounds: some come twice.
     pub(super) fn corners(&self) -> impl Iterator<Item = Vec3> {
         self.triangles().into_iter().flatten().flatten()
     }
@@ -234,8 +235,8 @@ impl FlatEmitter {
         emitted(material, &scene.textures, uv, cosine) * material.alpha.coverage(&scene.textures, uv)
     }
 
-    /// Whether a receiver is in the emitter's own plane as far as rounding can tell: what such a one sees of it is up to what rays meet.
-    /// A place on the emitter itself may be a hair before it, and would see 2π sr of it.
+    /// Whether a receiver is in the emitter's own plane as far as rounding can tell: what such a one sees of it is up
+    /// to what rays meet. A place on the emitter itself may be a hair before it, and would see 2π sr of it.
     fn is_level_with(&self, receiver: &LightReceiver) -> bool {
         (self.corner - receiver.position).dot(self.normal).abs() <= self.offset
     }
@@ -267,8 +268,9 @@ impl FlatEmitter {
     }
 }
 
-/// Square of the distance from which an emitter of this area, none of which is farther than `radius` from its centre, looks smaller than
-/// a solid angle: A/d² bounds that only where the emitter is not much nearer than its centre, so the nearest it can be is taken.
+/// Square of the distance from which an emitter of this area, none of which is farther than `radius` from its centre,
+/// looks smaller than a solid angle: A/d² bounds that only where the emitter is not much nearer than its centre, so the
+/// nearest it can be is taken.
 fn squared_distance_at(solid_angle: f32, area: f32, radius: f32) -> f32 {
     (radius + (area / solid_angle).sqrt()).powi(2)
 }
@@ -310,8 +312,8 @@ impl View {
     }
 }
 
-/// Square to triangle without folding, so that stratification survives (Heitz, "A Low-Distortion Map Between Triangle and
-/// Square", 2019).
+/// Square to triangle without folding, so that stratification survives (Heitz, "A Low-Distortion Map Between
+/// Triangle and Square", 2019).
 fn uniform_barycentrics([u, v]: [f32; 2]) -> Shares {
     if v > u {
         let x = 0.5 * u;

@@ -1,11 +1,12 @@
-//! What groups of emitters can give to a point, four groups at a time.
+//! What groups of emitters can give to a point, four groups at a time. Whether anything is in between is not asked.
 
 use super::lanes::FourVectors;
 use super::tree::{LightBounds, LightReceiver};
 use glam::{Vec3, Vec4};
 use std::f32::consts::PI;
 
-/// [`LightBounds`] of up to four groups as the walk of the tree needs them, one a lane: no angle is computed on the way.
+/// [`LightBounds`] of up to four groups as the walk of the tree needs them, one a lane: no angle is computed on the
+/// way.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Givers {
     center: FourVectors,
@@ -22,7 +23,7 @@ impl Givers {
     /// Groups side by side.
     pub(super) const LANES: usize = 4;
 
-    /// Of at most [`Self::LANES`] groups.
+    /// The givers among at most [`Self::LANES`] groups.
     pub(super) fn new(groups: &[LightBounds]) -> Self {
         let lanes = |value_of: &dyn Fn(&LightBounds) -> f32| {
             Vec4::from_array(std::array::from_fn(|lane| groups.get(lane).map_or(0.0, value_of)))

@@ -1,9 +1,11 @@
-//! Which kind of light is worth asking for in which part of the scene: indoors the sky, not the sun that is behind the wall.
+//! Which kind of light is worth asking for in which part of the scene: indoors the sky, not the sun that is behind the
+//! wall.
 //!
-//! Places that paths get to are gathered in groups by where they are, and samples of each kind of light, taken with their shadows, say how
-//! strong it is there. With one sample of a choice among kinds the variance is least where each is chosen in proportion to the root of its
-//! samples' mean square. It is done once, before any picture's sample is taken, so that a sample still depends on nothing but its own
-//! numbers. Each kind keeps a share, since what no probe has found may be there.
+//! Places that paths get to are gathered in groups by where they are, and samples of each kind of light, taken with
+//! their shadows, say how strong it is there. With one sample of a choice among kinds the variance is least where
+//! each is chosen in proportion to the root of its samples' mean square. It is done once, before any picture's sample
+//! is taken, so that a sample still depends on nothing but its own numbers. Each kind keeps a share, since what no
+//! probe has found may be there.
 
 use super::{Kind, LightKindProbabilities, LightReceiver, LightSample, Lights};
 use crate::geometry::World;
@@ -37,7 +39,7 @@ pub struct KindsByPlace {
 }
 
 impl KindsByPlace {
-    /// By what arrives at probes. `None` of too few.
+    /// Shares of the kinds by what arrives at probes; `None` of too few probes.
     pub(super) fn new(lights: &Lights, world: &World, probes: &[LightProbe], arrival: &Arrival) -> Option<Self> {
         let groups = Groups::new(probes)?;
         let strength = |kind: Kind, number: usize| -> f32 {

@@ -16,13 +16,13 @@ impl FourVectors {
         Self { x: along(0), y: along(1), z: along(2) }
     }
 
-    /// As seen from a point.
+    /// These positions as seen from a point.
     #[inline]
     pub(super) fn seen_from(&self, point: Vec3) -> Self {
         Self { x: self.x - point.x, y: self.y - point.y, z: self.z - point.z }
     }
 
-    /// Each over a number of its own.
+    /// These vectors, each over a number of its own.
     #[inline]
     pub(super) fn over(&self, lengths: Vec4) -> Self {
         Self { x: self.x / lengths, y: self.y / lengths, z: self.z / lengths }

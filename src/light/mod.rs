@@ -1,9 +1,9 @@
 //! Where light comes from, one file a kind, and how one is chosen.
 //!
-//! First a kind is chosen (the environment, lights from afar, emitters that have a place), by what each gives to that part of the scene, then
-//! one of the kind: by irradiance from afar, by a tree over what each can give to this point among the placed. Then a
-//! direction by the light's own rule. All pdfs are per steradian at the receiver and include the choices, so they can be
-//! weighed against those of BSDFs.
+//! First a kind is chosen (the environment, lights from afar, emitters that have a place), by what each gives to that
+//! part of the scene, then one of the kind: by irradiance from afar, by a tree over what each can give to this point
+//! among the placed. Then a direction by the light's own rule. All pdfs are per steradian at the receiver and include
+//! the choices, so they can be weighed against those of BSDFs.
 
 mod bilinear;
 mod collect;
@@ -89,7 +89,7 @@ enum Emitter {
     },
 }
 
-/// All lights of a world, ready to be sampled.
+/// The lights of a world, ready to be sampled.
 #[derive(Debug)]
 pub struct Lights {
     emitters: Vec<Emitter>,
@@ -117,7 +117,8 @@ impl Kind {
     const ALL: [Self; 3] = [Self::Environment, Self::Distant, Self::Placed];
 }
 
-/// What is left to a kind of light of the share that it has among equals, however weak it seems; a little less, since all shares add up to 1.
+/// What is left to a kind of light of the share that it has among equals, however weak it seems; a little less,
+/// since all shares add up to 1.
 const LEAST_SHARE: f32 = 0.3;
 
 /// Probabilities of the kinds.
@@ -132,7 +133,8 @@ impl LightKindProbabilities {
         Self(weights.map(|weight| weight / total))
     }
 
-    /// In proportion to how strong samples of the kinds are, but that each keeps a part of what it has here. The same where all are 0.
+    /// In proportion to how strong samples of the kinds are, but that each keeps a part of what it has here.
+    /// The same where all are 0.
     fn toward(self, strengths: [f32; Kind::ALL.len()]) -> Self {
         let total: f32 = strengths.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
@@ -187,7 +189,8 @@ impl Lights {
         self.shares.0.iter().filter(|share| **share > 0.0).count() > 1
     }
 
-    /// How kinds are best chosen where paths get to, by what arrives at probes there; `None` where it is best the same everywhere.
+    /// How kinds are best chosen where paths get to, by what arrives at probes there; `None` where it is best the same
+    /// everywhere.
     pub fn kinds_by_place(&self, world: &World, probes: &[LightProbe], arrival: &Arrival) -> Option<KindsByPlace> {
         KindsByPlace::new(self, world, probes, arrival)
     }
@@ -248,8 +251,9 @@ impl Lights {
         }
     }
 
-    /// Probability per steradian that [`Lights::sample`] for this receiver would have chosen the direction of a ray from
-    /// it that hit an emitting surface, at a distance from the receiver in scene units: the hit's, where the ray begins there.
+    /// Probability per steradian that [`Lights::sample`] for this receiver would have chosen the direction of a
+    /// ray from it that hit an emitting surface, at a distance from the receiver in scene units: the hit's,
+    /// where the ray begins there.
     pub fn pdf_of_hit(&self, world: &World, receiver: &LightReceiver, ray: &Ray, hit: &Hit, distance: f32) -> f32 {
         let (Some(of_triangle), Some(tree)) = (&self.emitter_of[hit.object as usize], &self.tree) else {
             return 0.0;
@@ -274,8 +278,8 @@ impl Lights {
             }
     }
 
-    /// What a ray which meets no surface sees of the environment and of the discs of lights from afar, apart: [`Lights::sample`] gives
-    /// light of the one it has chosen, so each is weighed against its own density.
+    /// What a ray which meets no surface sees of the environment and of the discs of lights from afar, apart:
+    /// [`Lights::sample`] gives light of the one it has chosen, so each is weighed against its own density.
     pub fn from_afar(&self, receiver: &LightReceiver, direction: Vec3) -> [LightFromAfar; 2] {
         let shares = self.shares_at(receiver.position);
         let environment = self.environment.as_ref().map(|e| LightFromAfar {

@@ -1,4 +1,4 @@
-//! What a camera may see of lamps: triangles and spheres.
+//! Tells what a camera may see of lamps: triangles and spheres. Whether anything hides them is left to the caller.
 
 use super::collect::triangle_at;
 use super::distant::{Disc, DistantLights};
@@ -8,7 +8,8 @@ use super::{Emitter, Lights};
 use crate::geometry::{Facet, World};
 use glam::Vec3;
 
-/// Where spheres stand for lights from afar, scene units: beyond every scene, and so far that cameras see them in one direction.
+/// Where spheres stand for lights from afar, scene units: beyond every scene, and so far that cameras see them in one
+/// direction.
 const AFAR: f32 = 1e12;
 
 /// A part of a lamp, in the world.
@@ -35,8 +36,8 @@ impl Lights {
         })
     }
 
-    /// The parts of all lamps that have a surface, as they are at a share of the open shutter, in one order at any time. Not those of lamps whose
-    /// emission is a picture or that alpha covers: they may be black anywhere.
+    /// The parts of all lamps that have a surface, as they are at a share of the open shutter, in one order at any
+    /// time. Not those of lamps whose emission is a picture or that alpha covers: they may be black anywhere.
     pub fn parts_at(&self, world: &World, time: f32) -> impl Iterator<Item = LampPart> {
         self.emitters.iter().flat_map(move |emitter| {
             let (object, surfaces) = match emitter {

@@ -1,4 +1,5 @@
-//! Lights that are points: point and spot.
+//! Lights that are points: point and spot. No path meets them by chance: they are only sampled. Directional lights are
+//! in `distant`.
 
 use super::{LightPlace, LightSample};
 use crate::scene::Light;

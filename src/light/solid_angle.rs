@@ -1,14 +1,14 @@
 //! Uniform directions in the solid angle of a triangle or a rectangle.
 //!
-//! In f64: the sums of angles cancel for shapes that look small. Not for solid angles below [`LEAST`], where sampling by
-//! area is as good and cheaper.
+//! In f64: the sums of angles cancel for shapes that look small. Not for solid angles below [`LEAST`], where sampling
+//! by area is as good and cheaper.
 
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Solid angle in steradian below which a shape is better sampled by area: up to 0.02 the variance of three scenes of ours stayed
-/// the same to four digits; at 0.1 the Cornell box had 2 % more, without any of this 5 % more in 13 % less time (once, by hand,
-/// with this constant changed and the variances of `render --json` compared).
+/// Solid angle in steradian below which a shape is better sampled by area: up to 0.02 the variance of three scenes of
+/// ours stays the same to four digits; at 0.1 the Cornell box has 2 % more, without any of this 5 % more in 13 % less
+/// time (once, by hand, with this constant changed and the variances of `render --json` compared).
 pub(super) const LEAST: f64 = 0.02;
 
 /// A triangle as seen from the origin.
@@ -21,7 +21,7 @@ pub(super) struct SphericalTriangle {
 }
 
 impl SphericalTriangle {
-    /// From corners relative to the observer.
+    /// A triangle by its corners relative to the observer.
     pub(super) fn new(plane: [DVec3; 3]) -> Self {
         let corners = plane.map(DVec3::normalize_or_zero);
         let [a, b, c] = corners;
@@ -113,13 +113,14 @@ pub(super) struct SphericalRectangle {
 }
 
 impl SphericalRectangle {
-    /// From a corner relative to the observer, the unit directions of two edges at a right angle, and their lengths.
+    /// A rectangle by a corner relative to the observer, the unit directions of two edges at a right angle, and their
+    /// lengths.
     pub(super) fn new(corner: DVec3, axes: [DVec3; 2], lengths: [f64; 2]) -> Self {
         let low = axes.map(|axis| corner.dot(axis));
         let high = [low[0] + lengths[0], low[1] + lengths[1]];
         let z = -corner.dot(axes[0].cross(axes[1])).abs();
-        // The normals of the four planes through the origin and an edge lie in coordinate planes, so that two that follow
-        // each other have only their z in common.
+        // The normals of the four planes through the origin and an edge lie in coordinate planes, so that two that
+        // follow each other have only their z in common.
         let z_of_normal = |edge: f64| {
             let length = (edge * edge + z * z).sqrt();
             if length > 0.0 { edge / length } else { 0.0 }

@@ -78,8 +78,8 @@ impl SphereEmitter {
         })
     }
 
-    /// Density per steradian of a direction that reaches the sphere at this distance; 0 for its far side, which is seen through what
-    /// alpha leaves out and is never sampled.
+    /// Density per steradian of a direction that reaches the sphere at this distance; 0 for its far side, which is seen
+    /// through what alpha leaves out and is never sampled.
     pub(super) fn pdf(&self, from: Vec3, direction: Vec3, distance: f32) -> f32 {
         let is_far_side = direction.dot(from + distance * direction - self.center) > 0.0;
         let one_minus_cos = self.one_minus_cos(from).filter(|_| !is_far_side);

@@ -161,8 +161,8 @@ fn bin(direction: Vec3) -> usize {
     row.min(19) * 40 + column.min(39)
 }
 
-/// Sampled directions fall as the pdf says (χ², significance 1e-3 for each scene and receiver), and the pdf and the share
-/// of failed samples add up to 1.
+/// Sampled directions fall as the pdf says (χ², significance 1e-3 for each scene and receiver), and the pdf and the
+/// share of failed samples add up to 1.
 #[test]
 fn samples_follow_their_pdf() {
     const SAMPLES: u64 = 40_000;
@@ -222,8 +222,8 @@ fn samples_follow_their_pdf() {
     }
 }
 
-/// Directions of a sample and of the ray that finds the same light have the same density, but for a few at outlines: where kinds of light are
-/// chosen by what arrives, too, here hardly anything of what comes from afar to one side.
+/// Directions of a sample and of the ray that finds the same light have the same density, but for a few at outlines:
+/// where kinds of light are chosen by what arrives, too, here hardly anything of what comes from afar to one side.
 #[test]
 fn both_sides_of_mis_state_the_same_density() {
     for (name, scene) in scenes() {
@@ -360,8 +360,8 @@ fn hundreds_of_lamps_hardly_raise_noise() {
     assert!(many < 0.1 * by_power, "{many} {by_power}");
 }
 
-/// A sun that shines on one side of the scene only is asked for there, and everywhere else a little; what samples say of the light stays
-/// the same.
+/// A sun that shines on one side of the scene only is asked for there, and everywhere else a little; what samples say
+/// of the light stays the same.
 #[test]
 fn kinds_of_light_are_chosen_by_what_arrives() {
     let mut scene = Scene { environment: Some(Environment::from_directions(48, 24, uneven)), ..Scene::default() };
@@ -425,7 +425,8 @@ fn disk() -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (std::iter::once(Vec3::ZERO).chain(rim).collect(), triangles)
 }
 
-/// A flat lamp gives nothing to itself, wherever rounding puts a place on it: neither to its back nor, where it emits on both sides, to either.
+/// A flat lamp gives nothing to itself, wherever rounding puts a place on it: neither to its back nor, where it emits
+/// on both sides, to either.
 #[test]
 fn a_flat_lamp_does_not_light_itself() {
     let square = vec![
@@ -488,7 +489,8 @@ fn a_flat_lamp_does_not_light_itself() {
     }
 }
 
-/// What is before a lamp by more than rounding has all of its light: right before it, π, and beside its rim, half of that.
+/// What is before a lamp by more than rounding has all of its light: right before it, π, and beside its rim, half of
+/// that.
 #[test]
 fn a_lamp_lights_what_nearly_touches_it() {
     for (center, size) in [(Vec3::ZERO, 1.0), (Vec3::new(5.0, 2.0, -3.0), 1.0), (Vec3::ZERO, 30.0)] {

@@ -11,8 +11,8 @@ use tempfile::NamedTempFile;
 
 /// Writes `path` by letting `write` fill a new file in the same folder, which then takes the target's place at once.
 ///
-/// If `write` fails, the new file is removed and the target stays as it was. A symbolic link is followed: the file that it
-/// points to is replaced or made, not the link.
+/// If `write` fails, the new file is removed and the target stays as it was. A symbolic link is followed: the file that
+/// it points to is replaced or made, not the link.
 ///
 /// # Errors
 /// That of `write`, or if the file cannot be made or put in its place.
@@ -26,7 +26,8 @@ pub fn write_beside(path: &Path, write: impl FnOnce(&mut File) -> std::io::Resul
     Ok(())
 }
 
-/// The same where something else writes the file, by its name; what ends it says nothing of its kind.
+/// Writes `path` as [`write_beside`] does, where something else writes the file, by its name; what ends it
+/// says nothing of its kind.
 ///
 /// # Errors
 /// If `write` fails, or the file cannot be made or renamed.
@@ -80,8 +81,8 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         // The error's own text names the temporary file, which the user never asked for.
         io(std::io::Error::new(error.kind(), format!("cannot make a file in {}: {}", folder.display(), plain(&error))))
     })?;
-    // Freed when it is renamed or its process ends, however it ends: by this others see that it is no leftover. Elsewhere locks keep what
-    // is written by name from being written.
+    // Freed when it is renamed or its process ends, however it ends: by this others see that it is no leftover.
+    // Elsewhere locks keep what is written by name from being written.
     #[cfg(unix)]
     let _ = file.as_file().try_lock();
     let mut unfinished = UNFINISHED.lock().unpoisoned();
@@ -142,8 +143,8 @@ fn part_prefix(name: &OsStr) -> OsString {
     prefix
 }
 
-/// Tells whether a file may be called so where it will be, before the work is done: the name that it has until it is complete is another, and
-/// is taken whatever this one is. Its folder may still have to be made.
+/// Tells whether a file may be called so where it will be, before the work is done: the name that it has until it is
+/// complete is another, and is taken whatever this one is. Its folder may still have to be made.
 ///
 /// # Errors
 /// [`OutputError::LongName`] if the system takes no such name.
@@ -180,8 +181,8 @@ pub fn hidden_name(name: &OsStr, ending: &str) -> OsString {
     hidden
 }
 
-/// A dot and a name, in no more than so many bytes. Of one that is too long the end gives way to a hash of all of it: names of a
-/// sequence's frames differ in their ends.
+/// A dot and a name, in no more than so many bytes. Of one that is too long the end gives way to a hash of all of it:
+/// names of a sequence's frames differ in their ends.
 fn hidden_within(most_bytes: usize, name: &OsStr) -> OsString {
     let mut hidden = OsString::from(".");
     let most_kept = most_bytes - hidden.len();
@@ -196,14 +197,16 @@ fn hidden_within(most_bytes: usize, name: &OsStr) -> OsString {
     hidden
 }
 
-/// Removes new files beside `path` that a killed program could not complete, as far as the folder can be read and they can be removed: no
-/// work is lost for the sake of tidiness. Those that another program is writing stay, as does everything where the file system has no locks.
+/// Removes new files beside `path` that a killed program could not complete, as far as the folder can be read and they
+/// can be removed: no work is lost for the sake of tidiness. Those that another program is writing stay, as does
+/// everything where the file system has no locks.
 pub fn remove_leftovers(path: &Path) {
     let Ok(target) = target_of(path) else { return };
     let Some(name) = target.file_name() else { return };
     let folder = folder_of(&target);
     let prefix = part_prefix(name);
-    // No more than the random letters: `.a.film.png.x1Y2z3.part` is of a.film.png, which another program may be writing.
+    // No more than the random letters: `.a.film.png.x1Y2z3.part` is of a.film.png, which another program may be
+    // writing.
     let is_leftover = |bytes: &[u8]| {
         let rest = bytes.strip_prefix(prefix.as_encoded_bytes());
         let letters = rest.and_then(|rest| rest.strip_suffix(PART_SUFFIX.as_bytes()));
@@ -225,7 +228,8 @@ fn is_nobodys(part: &Path) -> bool {
     file.is_ok_and(|file| file.try_lock().is_ok())
 }
 
-/// The system's words without the path that `tempfile` adds. Of a folder that is there it means that no file can be made in it, as in `/proc`.
+/// The system's words without the path that `tempfile` adds. Of a folder that is there it means that no file can be
+/// made in it, as in `/proc`.
 fn plain(error: &std::io::Error) -> String {
     if error.kind() == std::io::ErrorKind::NotFound {
         return "the folder takes no new files".to_owned();
@@ -276,7 +280,7 @@ mod tests {
         assert_eq!(names(folder.path()), ["a.png"]);
     }
 
-    /// It was told as "entity not found" of a folder that is there.
+    /// Regression: the message was "entity not found" of a folder that is there.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_folder_that_takes_no_files_is_named() {
@@ -284,7 +288,7 @@ mod tests {
         assert!(error.ends_with("cannot make a file in /proc: the folder takes no new files"), "{error}");
     }
 
-    /// One fixed name beside the file was another's, who renamed it half written.
+    /// Regression: with one fixed name beside the file, one writer renamed the other's half-written file.
     #[test]
     fn two_that_write_one_file_by_name_do_not_meet() {
         let folder = tempfile::tempdir().unwrap();
@@ -349,7 +353,7 @@ mod tests {
         }
     }
 
-    /// The new file beside it had a name that was taken, and the picture was lost when it was renamed.
+    /// Regression: the new file beside it had a name that was taken, and the picture was lost when it was renamed.
     #[test]
     fn names_that_no_file_can_have_are_refused_beforehand() {
         let folder = tempfile::tempdir().unwrap();

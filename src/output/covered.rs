@@ -1,9 +1,10 @@
 //! Pictures with alpha through an operator, each pixel before whatever lies behind it.
 //!
-//! Light that is multiplied by its alpha may be more than what covers the pixel could send: flames, glows and flares add light and cover little or
-//! nothing. What covers a pixel is taken to be no brighter than what is shown as white or than the brightest pixel nearby that is covered whole,
-//! since the soft edge of a lamp is no flame. Of light beyond that what covers the pixel sends white, channel by channel; the rest is in front
-//! of it, and adds what it adds before black.
+//! Light that is multiplied by its alpha may be more than what covers the pixel could send: flames, glows and
+//! flares add light and cover little or nothing. What covers a pixel is taken to be no brighter than what is shown
+//! as white or than the brightest pixel nearby that is covered whole, since the soft edge of a lamp is no flame. Of
+//! light beyond that what covers the pixel sends white, channel by channel; the rest is in front of it, and adds
+//! what it adds before black.
 
 use fechner_perception::tone::{FittedTone, Pixel};
 
@@ -16,13 +17,15 @@ const NEARLY_WHITE: f32 = 0.98;
 const HALVINGS: u32 = 23;
 /// Least light, of the display's white, that is a gain.
 const LEAST_GAIN: f32 = 1e-5;
-/// Around the pixel nearest to a soft edge that is covered whole its lamp is looked for so many pixels far: our widest filter, of radius 2, mixes
-/// what is up to 4 apart, so that between a lamp and what stands beside it the nearest may be of either.
+/// Around the pixel nearest to a soft edge that is covered whole its lamp is looked for so many pixels far: our
+/// widest filter, of radius 2, mixes what is up to 4 apart, so that between a lamp and what stands beside it the
+/// nearest may be of either.
 const EDGE_PIXELS: usize = 4;
-/// A soft edge is up to so many times as bright as the lamp that it ends at, a quarter of a stop: an edge has noise of its own, and more of the
-/// sky than what lies behind it. Alphas of 219 on a table's edge became 244.
+/// A soft edge is up to so many times as bright as the lamp that it ends at, a quarter of a stop: an edge has noise of
+/// its own, and more of the sky than what lies behind it. Without it alphas of 219 on a table's edge become 244.
 const EDGE_OVER_LAMP: f32 = 1.189_207_1;
-/// Above that light an edge becomes a flame over so many stops: at once, noise and rounding would put specks of white on soft edges.
+/// Above that light an edge becomes a flame over so many stops: at once, noise and rounding would put specks of white
+/// on soft edges.
 const STOPS_FROM_EDGE_TO_FLAME: f32 = 0.75;
 
 /// What is shown of a picture with alpha.
@@ -32,12 +35,13 @@ pub struct Covered<'a> {
     straight: Vec<[f32; 3]>,
     /// How much of each pixel is covered.
     alpha: &'a [f32],
-    /// Pixels with light in front of what covers them, by number: their display RGB multiplied by alpha, that light with it.
+    /// Pixels with light in front of what covers them, by number: their display RGB multiplied by alpha, that light
+    /// with it.
     beyond: Vec<(usize, [f32; 3])>,
 }
 
 impl<'a> Covered<'a> {
-    /// Of a picture in cd/m² that is multiplied by its alpha.
+    /// What covers the pixels of a picture in cd/m² that is multiplied by its alpha.
     pub fn of(fitted: &dyn FittedTone, map: Mapping, width: usize, rgb_cd_m2: &[[f32; 3]], alpha: &'a [f32]) -> Self {
         let straight = map(fitted, width, &divided_by_alpha(rgb_cd_m2, alpha));
         let beyond = beyond(fitted, map, width, rgb_cd_m2, alpha, &straight);
@@ -117,9 +121,9 @@ fn beyond(
     pixels.into_iter().map(light).filter(is_gain).collect()
 }
 
-/// The pixels that touch both what is covered by half or more and what has nothing, neither cover nor light: between them lies an edge,
-/// however bright the few samples were that met it. A mirroring rim of which a sixty-fourth was there was taken for a glow, and covered 92 % of
-/// its pixel.
+/// The pixels that touch both what is covered by half or more and what has nothing, neither cover nor light: between
+/// them lies an edge, however bright the few samples were that met it. Without this a mirroring rim of which a
+/// sixty-fourth is there is taken for a glow, and covers 92 % of its pixel.
 fn edges(width: usize, rgb_cd_m2: &[[f32; 3]], alpha: &[f32]) -> Vec<bool> {
     let touches = |pixel: usize, is_it: &dyn Fn(usize) -> bool| around(width, alpha.len(), pixel).any(is_it);
     let is_solid = |pixel: usize| alpha[pixel] >= 0.5;
@@ -128,8 +132,8 @@ fn edges(width: usize, rgb_cd_m2: &[[f32; 3]], alpha: &[f32]) -> Vec<bool> {
     (0..alpha.len()).map(is_edge).collect()
 }
 
-/// Light of what covers a pixel that is brighter than white and than the lamp nearby: white, but as bright as its edge may be
-/// where that is hardly darker.
+/// Light of what covers a pixel that is brighter than white and than the lamp nearby: white, but as bright as its edge
+/// may be where that is hardly darker.
 fn covering_light(white_cd_m2: f32, lamp_cd_m2: f32, straight_cd_m2: f32) -> f32 {
     if lamp_cd_m2 <= white_cd_m2 {
         return white_cd_m2;
@@ -138,8 +142,9 @@ fn covering_light(white_cd_m2: f32, lamp_cd_m2: f32, straight_cd_m2: f32) -> f32
     lamp_cd_m2 * (white_cd_m2 / lamp_cd_m2).powf(as_flame)
 }
 
-/// Of each pixel the largest channel, cd/m², of what is covered whole within [`EDGE_PIXELS`] of the nearest such pixels, all distances as a
-/// king goes: a soft edge ends at its lamp, however wide it is. 0 where nothing is covered whole.
+/// Of each pixel the largest channel, cd/m², of what is covered whole within [`EDGE_PIXELS`] of the nearest
+/// such pixels, all distances as a king goes: a soft edge ends at its lamp, however wide it is. 0 where
+/// nothing is covered whole.
 fn brightest_whole_nearby(width: usize, rgb_cd_m2: &[[f32; 3]], alpha: &[f32]) -> Vec<f32> {
     const FAR: u32 = u32::MAX;
     let own = |(rgb, alpha): (&[f32; 3], &f32)| if *alpha >= 1.0 { largest(*rgb) } else { 0.0 };
@@ -216,7 +221,8 @@ mod tests {
         operator.fit(&SceneGuide::of(&Plane::filled(8, 8, 20.0)), &Viewing::default(), None)
     }
 
-    /// Edges of what is dim and of a lamp beyond white, both of which are there uncut, and edges of hair that nothing uncut is as bright as.
+    /// Edges of what is dim and of a lamp beyond white, both of which are there uncut, and edges of hair that
+    /// nothing uncut is as bright as.
     #[test]
     fn soft_edges_stay_as_they_are() {
         let alpha = [1.0, 0.6, 0.1, 1.0, 0.5, 0.01, 0.3, 0.0];
@@ -240,7 +246,8 @@ mod tests {
         }
     }
 
-    /// An edge is a little brighter than what lies behind it, of a lamp that is shown as white as of one that nearly is, and stays an edge.
+    /// An edge is a little brighter than what lies behind it, of a lamp that is shown as white as of one that
+    /// nearly is, and stays an edge.
     #[test]
     fn edges_that_are_a_little_brighter_stay_as_they_are() {
         let alpha = [1.0, 0.86, 0.5, 0.2];
@@ -256,7 +263,8 @@ mod tests {
         }
     }
 
-    /// Flames before black are as bright as without alpha, and what lies behind them is covered no more than it must be.
+    /// Flames before black are as bright as without alpha, and what lies behind them is covered no more than it must
+    /// be.
     #[test]
     fn light_that_covers_nothing_is_shown() {
         let rgb = [[1.0; 3], [40.0, 30.0, 10.0], [50.0; 3], [0.0; 3]];
@@ -288,7 +296,8 @@ mod tests {
         }
     }
 
-    /// A lamp elsewhere is no reason to show a flame darker, nor one beside it that is not as bright: neither is its soft edge.
+    /// A lamp elsewhere is no reason to show a flame darker, nor one beside it that is not as bright: neither is its
+    /// soft edge.
     #[test]
     fn bright_things_leave_flames_alone() {
         const SIDE: usize = 16;
@@ -300,7 +309,8 @@ mod tests {
             let fitted = fitted(name);
             let shown = |rgb: &[[f32; 3]]| Covered::of(fitted.as_ref(), map_picture, SIDE, rgb, &alpha).premultiplied();
             let (right, black) = (shown(&without), map_picture(fitted.as_ref(), SIDE, &without));
-            // Far away whatever it is; beside the flame what is a stop darker than light of 8,000 cd/m² behind its alpha.
+            // Far away whatever it is; beside the flame what is a stop darker than light of 8,000 cd/m² behind its
+            // alpha.
             for (lamp, lamp_cd_m2) in [(2 * SIDE + 2, 1e6), (2 * SIDE + 7, 3500.0)] {
                 let mut rgb = without.clone();
                 rgb[lamp] = [lamp_cd_m2; 3];
@@ -315,7 +325,8 @@ mod tests {
         }
     }
 
-    /// A rim that mirrors a lamp is an edge, of which few samples met it; a flame beside it with light all around is none.
+    /// A rim that mirrors a lamp is an edge, of which few samples met it; a flame beside it with light all around is
+    /// none.
     #[test]
     fn a_bright_rim_covers_no_more_than_it_does() {
         let alpha = [1.0, 0.02, 0.0, 0.0, 1.0, 0.02, 0.02, 0.02];
@@ -332,7 +343,8 @@ mod tests {
         }
     }
 
-    /// However wide: as out of focus, as ours is between two things that are covered whole, and a little brighter than the lamp's whole part.
+    /// However wide: as out of focus, as ours is between two things that are covered whole, and a little brighter
+    /// than the lamp's whole part.
     #[test]
     fn wide_soft_edges_of_lamps_stay_as_they_are() {
         const WIDTH: usize = 64;

@@ -18,8 +18,9 @@ use std::path::Path;
 /// Largest finite half float.
 const F16_MAX: f32 = 65504.0;
 
-/// Writes a picture as an EXR file: ZIP-compressed scan lines, Rec.709 primaries, and `whiteLuminance` from the attribute
-/// [`NITS_PER_UNIT`] if there is one. A part of a picture has its place as data window and the whole as display window.
+/// Writes a picture as an EXR file: ZIP-compressed scan lines, Rec.709 primaries, and `whiteLuminance` from the
+/// attribute [`NITS_PER_UNIT`] if there is one. A part of a picture has its place as data window and the whole as
+/// display window.
 ///
 /// Values that a file should not hold are replaced rather than refused, since a picture may be hours of work: NaN by 0,
 /// infinities and halves out of range by the largest finite value. The attribute [`REPLACED_VALUES`] then counts them.
@@ -147,7 +148,8 @@ fn flat_samples(values: &ChannelValues<'_>, replaced: &mut usize) -> FlatSamples
     }
 }
 
-/// Text in ASCII: the format does not say what the bytes above it mean, and Python's OpenEXR refuses files that have any.
+/// Text in ASCII: the format does not say what the bytes above it mean, and Python's OpenEXR refuses files that have
+/// any.
 fn text(text: &str) -> Text {
     let plain = |c: char| match c {
         '²' => '2',

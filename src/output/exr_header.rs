@@ -1,7 +1,7 @@
 //! Attributes of an EXR header in a fixed order.
 //!
-//! The `exr` crate keeps custom attributes in a hash map, so it writes them in another order in each run. Attributes may
-//! stand in any order and each carries its length, so sorting them in place moves nothing else in the file.
+//! The `exr` crate keeps custom attributes in a hash map, so it writes them in another order in each run. Attributes
+//! may stand in any order and each carries its length, so sorting them in place moves nothing else in the file.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 

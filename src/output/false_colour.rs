@@ -6,16 +6,17 @@ use fechner_perception::Plane;
 pub struct Colours {
     /// Row-major.
     pub rgb8: Vec<u8>,
-    /// In words.
+    /// What the colours mean, in words.
     pub legend: String,
 }
 
-/// What is not known: of all greys the one that is farthest from every other colour here, also to eyes that lack red, green or blue (a
-/// ΔE*ab of 20 by Machado and others 2009).
+/// What is not known: of all greys the one that is farthest from every other colour here, also to eyes that lack red,
+/// green or blue (a ΔE*ab of 20 by Machado and others 2009).
 const UNKNOWN: [u8; 3] = [175; 3];
 const UNKNOWN_IN_WORDS: &str = "grey: not known";
 
-/// Positive values by their logarithm, dark to bright, between the 0.5th and the 99.5th percentile; grey what is not finite.
+/// Positive values by their logarithm, dark to bright, between the 0.5th and the 99.5th percentile; grey what is not
+/// finite.
 pub fn logarithmic(values: &Plane, unit: &str) -> Colours {
     let range = range(values);
     let share = |v: f32| range.map_or(0.0, |Range { low, high, .. }| share_of(f64::from(v).max(low), low, high));
@@ -42,11 +43,12 @@ pub(crate) fn share_of(value: f64, low: f64, high: f64) -> f64 {
     (value / low).ln() * scale
 }
 
-/// Heat of what is just above a target: red, by a ΔE*ab of 88 from the blue at the target, 59 to eyes that lack red; the purple that is
-/// halfway to black was at 35 and 11.
+/// Heat of what is just above a target: red, by a ΔE*ab of 88 from the blue at the target, 59 to eyes that lack red;
+/// the purple that is halfway to black is at 35 and 11.
 const HEAT_AT_TARGET: f64 = 0.65;
 
-/// Visibility against a target: blue to black below it, red through orange to pale yellow at four times it; grey what is not known.
+/// Visibility against a target: blue to black below it, red through orange to pale yellow at four times it; grey what
+/// is not known.
 pub fn visibility(values: &Plane, target: f64) -> Colours {
     let rgb8 = colours_of_known(values, |v| {
         let ratio = f64::from(v) / target;
@@ -96,7 +98,7 @@ pub(crate) struct Range {
     has_above: bool,
 }
 
-/// Of the finite values above 0; `None` where there are none.
+/// Range of the finite values above 0; `None` where there are none.
 pub(crate) fn range(values: &Plane) -> Option<Range> {
     let finite = || values.values().iter().copied().filter(|v| v.is_finite());
     let mut above: Vec<f32> = finite().filter(|v| *v > 0.0).collect();
@@ -107,7 +109,8 @@ pub(crate) fn range(values: &Plane) -> Option<Range> {
     Some(Range { low: low.into(), high: high.into(), has_below: least < low, has_above: greatest > high })
 }
 
-/// Codes of sRGB, 0 to 1, for a share of 0 to 1: black, purple, red, orange, pale yellow (magma, in the steps that FLIP has).
+/// Codes of sRGB, 0 to 1, for a share of 0 to 1: black, purple, red, orange, pale yellow (magma, in the steps that FLIP
+/// has).
 pub(crate) fn heat(share: f64) -> [f32; 3] {
     // NaN becomes 0.
     flip_rs::MAGMA[(share.clamp(0.0, 1.0) * 255.0) as usize]

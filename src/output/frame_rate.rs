@@ -1,9 +1,10 @@
 //! Frame rates as fractions, as videos and OpenEXR's own `framesPerSecond` tell them.
 
-/// Frames a second of the sequence that a picture is of: [`write_exr`](super::write_exr) puts this attribute where the format has it.
+/// Frames a second of the sequence that a picture is of: [`write_exr`](super::write_exr) puts this attribute where the
+/// format has it.
 pub const FRAMES_PER_SECOND: &str = "framesPerSecond";
 
-/// As the format has it.
+/// A frame rate as the format has it, numerator and denominator; `None` where it cannot be one.
 pub(super) fn rational(frames_per_second: f32) -> Option<(i32, u32)> {
     let (frames, seconds) = fraction(f64::from(frames_per_second));
     Some((i32::try_from(frames).ok()?, u32::try_from(seconds).ok()?))

@@ -1,8 +1,8 @@
 //! Picture files: what is in them, and how they are written.
 //!
-//! [`write_exr`] writes linear data of any number of channels, [`write_png`] a picture for a display. Both write beside the
-//! target and rename, so that a target is either the old file, the new file or absent, never a part of one; and both give
-//! equal bytes for equal pixels, so that files can be compared by their hash.
+//! [`write_exr`] writes linear data of any number of channels, [`write_png`] a picture for a display. Both write beside
+//! the target and rename, so that a target is either the old file, the new file or absent, never a part of one; and
+//! both give equal bytes for equal pixels, so that files can be compared by their hash.
 //!
 //! Call [`check_target`] before a long render: it finds out whether the file can be written at all.
 
@@ -48,11 +48,12 @@ pub const REPLACED_VALUES: &str = "replaced_values";
 
 /// Width of a pixel over its height: [`write_exr`] puts this attribute where the format has it.
 pub const PIXEL_ASPECT_RATIO: &str = "pixelAspectRatio";
-/// Written by [`write_exr`] where the picture is a part of a larger one: left, top, width and height in pixels. Readers here show
-/// such a part alone, not the display window around it.
+/// Written by [`write_exr`] where the picture is a part of a larger one: left, top, width and height in pixels. Readers
+/// here show such a part alone, not the display window around it.
 pub const CROP: &str = "fechner.crop";
 
-/// All of a display as JSON, in ASCII: readers take an attribute's text for UTF-8, the writer has Latin-1.
+/// The attribute that keeps all of a display, as JSON in ASCII: readers take an attribute's text for UTF-8, the writer
+/// has Latin-1.
 pub fn display_attribute(display: &Display) -> Option<(String, Attribute)> {
     let text = serde_json::to_string(display).ok()?;
     let mut ascii = String::with_capacity(text.len());
@@ -66,8 +67,8 @@ pub fn display_attribute(display: &Display) -> Option<(String, Attribute)> {
     Some((attribute::DISPLAY.to_owned(), Attribute::Text(ascii)))
 }
 
-/// The fit of a tone operator as JSON of a [`fechner_perception::tone::SavedTone`]. None for one that knows places: it has values
-/// for each pixel, and can be fitted to the picture again.
+/// The fit of a tone operator as JSON of a [`fechner_perception::tone::SavedTone`]. None for one that knows places: it
+/// has values for each pixel, and can be fitted to the picture again.
 pub fn tone_attribute(fitted: &dyn FittedTone) -> Option<(String, Attribute)> {
     const LONGEST: usize = 1 << 16;
     let text = serde_json::to_string(&fitted.save()).ok().filter(|text| text.len() <= LONGEST)?;
@@ -92,14 +93,14 @@ pub struct Picture<'a> {
 /// The place of a picture in a larger one, in whose window compositors put it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PartOf {
-    /// Its top left pixel in the whole, x to the right and y down.
+    /// Top left pixel of the picture in the whole, x to the right and y down.
     pub origin: [u32; 2],
     /// Width and height of the whole in pixels.
     pub whole: [u32; 2],
 }
 
 impl PartOf {
-    /// Of a render; `None` where all of the picture is traced.
+    /// The place of a render's picture in its whole; `None` where all of it is traced.
     pub fn of(trace: &TraceSettings) -> Option<Self> {
         let part = |crop: Crop| Self { origin: [crop.x, crop.y], whole: [trace.width, trace.height] };
         trace.crop.map(part)
@@ -171,8 +172,8 @@ impl<'a> Picture<'a> {
 /// A named fact about a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Attribute {
-    /// Text in ASCII: a few signs (², ×, –) have a plain one instead, all other characters become `?`, since the format does not say
-    /// what its bytes mean.
+    /// Text in ASCII: a few signs (², ×, –) have a plain one instead, all other characters become `?`, since the format
+    /// does not say what its bytes mean.
     Text(String),
     /// A number.
     Float(f32),

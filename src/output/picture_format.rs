@@ -1,4 +1,4 @@
-//! Formats of the pictures that are written.
+//! Formats of the pictures that are written, by the ending of a file's name. Not of those that are read.
 
 use super::OutputError;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PictureFormat {
-    /// As the display shows it: 8-bit sRGB, or 16-bit PQ for an HDR display.
+    /// The picture as the display shows it: 8-bit sRGB, or 16-bit PQ for an HDR display.
     Png,
     /// Linear data, many channels.
     Exr,

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Writes linear display RGB, where 0 is the display's black and 1 its white, as the display wants it: [`write_pq_png`] for
-/// one of SMPTE ST 2084, [`write_png`] for all others, which colour management brings to them.
+/// Writes linear display RGB, where 0 is the display's black and 1 its white, as the display wants it: [`write_pq_png`]
+/// for one of SMPTE ST 2084, [`write_png`] for all others, which colour management brings to them.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -28,17 +28,17 @@ pub fn write_png_for(
     }
 }
 
-/// The default took a third of the time of a tone-mapped picture of 1920×1080.
+/// Fast: the default takes a third of the time of a tone-mapped picture of 1920×1080.
 const COMPRESSION: png::Compression = png::Compression::Fast;
 
 /// Code points of ITU-T H.273: primaries of BT.2020, transfer of SMPTE ST 2084 (PQ), RGB, full range.
 const CICP_BT2020_PQ: [u8; 4] = [9, 16, 0, 1];
 
-/// Writes what the display emits as a 16-bit PNG in PQ code values and Rec.2020 primaries, with the cICP chunk (PNG, third
-/// edition) that says so.
+/// Writes what the display emits as a 16-bit PNG in PQ code values and Rec.2020 primaries, with the cICP chunk (PNG,
+/// third edition) that says so.
 ///
-/// Values are absolute: `rgb_linear_display` of 0 is the display's black, 1 its white, both in cd/m². What the screen reflects
-/// of the room is not in the codes, since it adds that by itself. NaN becomes black.
+/// Values are absolute: `rgb_linear_display` of 0 is the display's black, 1 its white, both in cd/m². What the screen
+/// reflects of the room is not in the codes, since it adds that by itself. NaN becomes black.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -343,7 +343,8 @@ mod tests {
         assert_eq!((&bytes[8..14], &bytes[14..]), (&opaque[6..], &[0, 0][..]));
     }
 
-    /// Pixels twice as wide as high stay so, in sRGB and in PQ, with alpha and without; whole pixels a metre that differ by rounding are square.
+    /// Pixels twice as wide as high stay so, in sRGB and in PQ, with alpha and without; whole pixels a metre that
+    /// differ by rounding are square.
     #[test]
     fn the_shape_of_pixels_is_kept() {
         let folder = tempfile::tempdir().unwrap();

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 /// Transfer of sRGB (IEC 61966-2-1) in ITU-T H.273.
 const SRGB_TRANSFER: u8 = 13;
 
-/// Linear display RGB, 0 the display's black and 1 its white, of PQ codes (0 to 1) in these primaries; [`write_pq_png`](super::write_pq_png) writes
-/// Rec.2020's. The display clips each channel at its black and its white; a colour that Rec.709 does not reach is brought in at the luminance that
-/// it has.
+/// Linear display RGB, 0 the display's black and 1 its white, of PQ codes (0 to 1) in these primaries;
+/// [`write_pq_png`](super::write_pq_png) writes Rec.2020's. The display clips each channel at its black and its white;
+/// a colour that Rec.709 does not reach is brought in at the luminance that it has.
 pub fn decode_pq(codes: &[[f32; 3]], primaries: &Primaries, display: &Display) -> Vec<[f32; 3]> {
     let narrow = primaries.to(&Primaries::REC709).unwrap_or(IDENTITY);
     let relative = |code: f32| display.relative_of_emitted(Eotf::pq_cd_m2(f64::from(code)));
@@ -24,9 +24,9 @@ pub fn decode_pq(codes: &[[f32; 3]], primaries: &Primaries, display: &Display) -
 /// What the codes of a PNG file mean by its chunks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PngColour {
-    /// Their curve.
+    /// Curve of the codes.
     pub transfer: PngTransfer,
-    /// Their primaries; `None` where nothing says, or what is said is not known.
+    /// Primaries of the codes; `None` where nothing says, or what is said is not known.
     pub primaries: Option<Primaries>,
     /// What it says and is not heeded, for whoever should know.
     pub notes: Vec<String>,
@@ -47,8 +47,9 @@ pub enum PngTransfer {
     Untagged,
 }
 
-/// Of a file in memory, by its header; [`PngTransfer::Untagged`] for what is no PNG. Of what contradicts itself the surest holds: cICP, then a
-/// colour profile, then sRGB, then a gamma and chromaticities (PNG, third edition, 4.3).
+/// The colour of a file in memory, by its header; [`PngTransfer::Untagged`] for what is no PNG. Of what
+/// contradicts itself the surest holds: cICP, then a colour profile, then sRGB, then a gamma and chromaticities
+/// (PNG, third edition, 4.3).
 pub fn png_colour(bytes: &[u8]) -> PngColour {
     let mut colour = PngColour { transfer: PngTransfer::Untagged, primaries: None, notes: Vec::new() };
     let Ok(reader) = png::Decoder::new(std::io::Cursor::new(bytes)).read_info() else { return colour };
@@ -130,7 +131,8 @@ pub(super) const SQUARE_WITHIN: f64 = 1e-3;
 /// Width over height that a pixel can have, as in an EXR file.
 const PIXEL_ASPECT_RATIOS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
-/// Width of a pixel over its height by a PNG's chunk pHYs, in whatever unit; 1 for what says nothing or nothing that a pixel can have.
+/// Width of a pixel over its height by a PNG's chunk pHYs, in whatever unit; 1 for what says nothing or
+/// nothing that a pixel can have.
 pub fn png_pixel_aspect_ratio(bytes: &[u8]) -> f64 {
     let Ok(reader) = png::Decoder::new(std::io::Cursor::new(bytes)).read_info() else { return 1.0 };
     let Some(shape) = reader.info().pixel_dims else { return 1.0 };
@@ -142,7 +144,8 @@ pub fn png_pixel_aspect_ratio(bytes: &[u8]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Each channel of the display clips for itself; then Rec.2020's colours keep the luminance that they have, which was 20 % too much of green.
+    /// Each channel of the display clips for itself; then Rec.2020's colours keep the luminance that they have.
+    /// Regression: green's was 20 % too much.
     #[test]
     fn pq_colours_outside_rec_709_keep_their_luminance() {
         let display = Display::preset("hdr-1000").unwrap();

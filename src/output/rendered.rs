@@ -1,4 +1,4 @@
-//! The files a render leaves: what the display shows, or every layer of it.
+//! Writes the files a render leaves: what the display shows, or every layer of it.
 
 use super::covered::Covered;
 use super::{
@@ -22,8 +22,9 @@ pub enum Background {
     Transparent,
 }
 
-/// Writes the picture through its tone operator, coded for the display, and tells whether any pixel's alpha was raised. A transparent background
-/// gives straight alpha, the colours being those of what covers the pixel; light that alpha could not hold raises it, as [`Covered`] says.
+/// Writes the picture through its tone operator, coded for the display, and tells whether any pixel's alpha was raised.
+/// A transparent background gives straight alpha, the colours being those of what covers the pixel; light that alpha
+/// could not hold raises it, as [`Covered`] says.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -35,7 +36,8 @@ pub fn write_display_png(
 ) -> Result<bool, OutputError> {
     let judgement = &rendered.judgement;
     let (width, height) = (rendered.film.width(), rendered.film.height());
-    // As a file's readers have it: the judgement's own tells luminances as of each pixel's colour, by which nothing red is white.
+    // As a file's readers have it: the judgement's own tells luminances as of each pixel's colour, by which nothing red
+    // is white.
     let (tone, picture) = (judgement.tone.save().restore(), judgement.picture());
     let tone = tone.as_ref();
     match background {
@@ -54,11 +56,11 @@ pub fn write_display_png(
     }
 }
 
-/// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent, albedo,
-/// normal, depth, object id, sample count, variance of the picture's luminance (scene cd/m², squared), threshold (standard
-/// error in display cd/m² that is at visibility 1) and predicted visibility. A picture that is denoised has the raw mean in
-/// `raw` beside it, the visible parts of its noise and of its bias, and 1 in `unproven` where no witness shows that bias
-/// stays below one and a half times `target`. A crop is a part of the whole picture.
+/// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent,
+/// albedo, normal, depth, object id, sample count, variance of the picture's luminance (scene cd/m², squared),
+/// threshold (standard error in display cd/m² that is at visibility 1) and predicted visibility. A picture that is
+/// denoised has the raw mean in `raw` beside it, the visible parts of its noise and of its bias, and 1 in `unproven`
+/// where no witness shows that bias stays below one and a half times `target`. A crop is a part of the whole picture.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -1,7 +1,7 @@
 //! Linear light to 8-bit sRGB codes with a dither, by straight lines between tabulated places of the curve.
 //!
-//! Every frame of a preview and every PNG passes here. `powf` for each channel took as much of a frame as its JPEG (`cargo bench
-//! --bench frames`). Between 512 places an octave a line is off by at most 5e-5 of a step of 8 bits.
+//! Every frame of a preview and every PNG passes here. `powf` for each channel took as much of a frame as its JPEG
+//! (`cargo bench --bench frames`). Between 512 places an octave a line is off by at most 5e-5 of a step of 8 bits.
 
 use fechner_perception::eotf::{SRGB_SLOPE, srgb_from_linear};
 use std::sync::LazyLock;
@@ -29,8 +29,8 @@ impl SrgbCodes {
         Self(&STEPS)
     }
 
-    /// The code of a linear value clamped to 0..1 (1: display white; NaN: black), `dither` in [0, 1) added before the fraction is
-    /// cut off: a value that is a whole step stays that step.
+    /// The code of a linear value clamped to 0..1 (1: display white; NaN: black), `dither` in [0, 1) added before the
+    /// fraction is cut off: a value that is a whole step stays that step.
     #[inline]
     pub(super) fn code(self, linear: f32, dither: f32) -> u8 {
         let steps = if linear < LOWEST {

@@ -1,7 +1,8 @@
 //! The page of a preview on a render that is somebody else's: it is watched and can be stopped, not driven.
 //!
-//! The render keeps its own loop, checkpoints and files; its monitor hands each moment on to an [`Audience`], which shows it to
-//! whoever looks, at the preview's rate. Not for renders that answer to viewers: [`super::start`] opens those.
+//! The render keeps its own loop, checkpoints and files; its monitor hands each moment on to an [`Audience`],
+//! which shows it to whoever looks, at the preview's rate. Not for renders that answer to viewers:
+//! [`super::start`] opens those.
 
 use super::command::{Command, Phase, Status};
 use super::orbit::Held;
@@ -22,7 +23,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// So long viewers are told that the render is not driven.
+/// Time for which viewers are told that the render is not driven.
 const REFUSAL: Duration = Duration::from_secs(6);
 
 /// Viewers of a render under way; they are sent away when it has ended or is dropped.
@@ -98,12 +99,12 @@ impl<'a> Audience<'a> {
         publish(&moving.status, &self.shared);
     }
 
-    /// After each look at the picture.
+    /// Keeps the progress that is told after each look at the picture.
     pub fn looked(&self, progress: &Progress) {
         self.moving().progress = Some(*progress);
     }
 
-    /// After each look, what was seen.
+    /// Keeps what was seen after each look.
     pub fn judged(&self, state: &RenderState, judgement: &Judgement) {
         let mut moving = self.moving();
         moving.screen.looked = Some(Arc::new(Looked::of(judgement)));
@@ -148,8 +149,8 @@ impl<'a> Audience<'a> {
         directive
     }
 
-    /// The render is at an end: shows its last frame, says why, and sends everybody away, so that no connection takes a file from what is
-    /// written next.
+    /// The render is at an end: shows its last frame, says why, and sends everybody away, so that no connection takes a
+    /// file from what is written next.
     pub fn ended(&self, state: &RenderState, reason: StopReason) {
         let mut moving = self.moving();
         moving.status.phase = Phase::Stopped;

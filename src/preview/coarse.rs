@@ -1,5 +1,5 @@
-//! From coarse to fine: an order of pixels in which every beginning covers the picture, and what stands in for pixels that
-//! have not had their turn.
+//! From coarse to fine: an order of pixels in which every beginning covers the picture, and what stands in for pixels
+//! that have not had their turn.
 
 use crate::film::Film;
 use crate::integrator::{BlockWork, SamplePlan};
@@ -13,8 +13,8 @@ fn spacing(x: u32, y: u32) -> u32 {
     1 << both.trailing_zeros()
 }
 
-/// All pixels of a picture, grid after grid. Rows of a grid that follow one another lie far apart: the finest grid is most of the
-/// picture, and swept from above it would leave the lower part behind for seconds.
+/// All pixels of a picture, grid after grid. Rows of a grid that follow one another lie far apart: the finest grid is
+/// most of the picture, and swept from above it would leave the lower part behind for seconds.
 fn coarse_to_fine(width: u32, height: u32) -> Vec<u32> {
     let mut rows: Vec<u32> = (0..height).collect();
     rows.sort_unstable_by_key(|y| y.reverse_bits());
@@ -28,9 +28,9 @@ fn coarse_to_fine(width: u32, height: u32) -> Vec<u32> {
     pixels
 }
 
-/// Puts the blocks of a pilot's every pass over the picture in an order from coarse to fine. The passes stay: some of a pilot's
-/// samples for every pixel look better than all of them for some pixels. Blocks of one pixel's half keep their order, so the film
-/// that comes of it has the same bytes.
+/// Puts the blocks of a pilot's every pass over the picture in an order from coarse to fine. The passes stay: some of a
+/// pilot's samples for every pixel look better than all of them for some pixels. Blocks of one pixel's half keep their
+/// order, so the film that comes of it has the same bytes.
 pub(super) fn order(pilot: &mut SamplePlan, width: u32, height: u32) {
     let order = coarse_to_fine(width, height);
     let mut of_pixel: Vec<Option<BlockWork>> = vec![None; order.len()];
@@ -42,8 +42,8 @@ pub(super) fn order(pilot: &mut SamplePlan, width: u32, height: u32) {
     }
 }
 
-/// The index of the pixel whose samples stand for one: itself, or the nearest above and to the left on a grid that has been
-/// sampled. `None` where there is none yet.
+/// The index of the pixel whose samples stand for one: itself, or the nearest above and to the left on a grid that has
+/// been sampled. `None` where there is none yet.
 pub(super) fn stand_in(film: &Film, pixel: usize) -> Option<usize> {
     let width = film.width();
     let (x, y) = (pixel as u32 % width, pixel as u32 / width);

@@ -1,4 +1,4 @@
-//! What viewers and the preview say to each other, as JSON.
+//! What viewers and the preview say to each other, as JSON. What is done about it is left to `session`.
 
 use super::layer::Layer;
 use super::orbit::Movement;
@@ -36,7 +36,7 @@ pub(super) enum Command {
     Restart,
     /// Write the picture into the working folder.
     Save {
-        /// As what.
+        /// Format of the picture's file.
         format: PictureFormat,
     },
     /// Exposure correction in stops; none is the scene's.
@@ -56,7 +56,7 @@ pub(super) enum Command {
     },
     /// Another distance from the display.
     Distance {
-        /// In distances that the display is made for.
+        /// Distance of the eyes, in distances that the display is made for.
         factor: f64,
     },
     /// Another visibility to stop at.
@@ -139,7 +139,7 @@ pub(super) enum Phase {
     Stopped,
 }
 
-/// Everything that a page shows beside the picture.
+/// The figures that a page shows beside the picture.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Status {
     pub(super) kind: &'static str,
@@ -153,9 +153,9 @@ pub(super) struct Status {
     pub(super) mean_samples: f64,
     pub(super) samples_a_second: f64,
     pub(super) seconds: f64,
-    /// To the first look, later to the rung.
+    /// Seconds to the first look, later to the rung.
     pub(super) seconds_left: Option<f64>,
-    /// Of every pixel before the first look; not told.
+    /// Samples of every pixel before the first look; not told.
     #[serde(skip)]
     pub(super) pilot_samples: u32,
     /// Share of pixels above the target at the last look.
@@ -168,7 +168,7 @@ pub(super) struct Status {
     pub(super) operators: &'static [&'static str],
     pub(super) display: String,
     pub(super) displays: Vec<String>,
-    /// In distances that the display is made for.
+    /// Distance of the eyes, in distances that the display is made for.
     pub(super) distance: f64,
     pub(super) pixels_per_degree: f64,
     pub(super) camera: String,

@@ -1,4 +1,5 @@
-//! The picture that is shown, put together from a film or from what a look has denoised.
+//! The picture that is shown, put together from a film or from what a look has denoised. Linear light: it is mapped
+//! for the display elsewhere.
 
 use super::coarse::stand_in;
 use super::spectator::Stage;
@@ -16,13 +17,14 @@ pub(super) struct Composed {
 }
 
 impl Composed {
-    /// Of a film whose picture is denoised: its samples alone are asked for.
+    /// A denoised picture, of whose film the samples alone are asked for.
     pub(super) fn of_denoised(rgb_cd_m2: &Arc<Vec<[f32; 3]>>, film: &Film) -> Self {
         let samples = (0..film.pixel_count()).into_par_iter().map(|pixel| film.samples(pixel)).collect();
         Self { rgb_cd_m2: Arc::clone(rgb_cd_m2), samples }
     }
 
-    /// Of the film itself; where a pixel has no samples, another's picture. In one walk: a film is many times as large as a picture.
+    /// The picture of the film itself; where a pixel has no samples, another's. In one walk: a film is many
+    /// times as large as a picture.
     pub(super) fn of_film(film: &Film, nits_per_unit: f64, stage: Stage) -> Self {
         // While a pixel's pilot is traced one half is ahead of the other, and their samples count alike.
         let is_in_pilot =

@@ -1,4 +1,4 @@
-//! The files of a scene, watched for edits.
+//! Watches the files of a scene for edits. To load it again is left to `session`.
 
 use super::Host;
 use super::command::Command;
@@ -25,7 +25,8 @@ struct Watched {
 }
 
 impl Watched {
-    /// Whether it is another now. One that is gone is waited for once: between a save's removal and its renaming there may be none.
+    /// Whether it is another now. One that is gone is waited for once: between a save's removal and its
+    /// renaming there may be none.
     fn has_become(&mut self, now: Stamp) -> bool {
         let is_gone = now.is_none() && self.stamp.is_some();
         let was_missed = std::mem::replace(&mut self.is_missed, is_gone);

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Of frames of a picture that changes, 1 to 100.
+/// Quality of frames of a picture that changes, 1 to 100.
 const JPEG_QUALITY: u8 = 92;
 
 /// A layer's picture, to be encoded.
@@ -20,7 +20,7 @@ pub(super) struct Frame {
     pub(super) colours: Colours,
     pub(super) width: u32,
     pub(super) height: u32,
-    /// At rest it is exact.
+    /// Whether it is on its way or at rest; at rest it is exact.
     pub(super) stage: Stage,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Frame {
 #[derive(Default)]
 pub(super) struct Encoding {
     under_way: AtomicUsize,
-    /// Of all threads, for the last frames that were encoded beside the render.
+    /// Nanoseconds, of all threads, for the last frames that were encoded beside the render.
     cost_ns: AtomicU64,
 }
 
@@ -42,8 +42,8 @@ impl Encoding {
         Duration::from_nanos(self.cost_ns.load(Ordering::SeqCst))
     }
 
-    /// Encodes the frames of one moment and publishes them: at once on a single thread, and at rest, as the last ones must not be
-    /// late; else on the first of the pool's threads that is free, while the others go on.
+    /// Encodes the frames of one moment and publishes them: at once on a single thread, and at rest, as the last ones
+    /// must not be late; else on the first of the pool's threads that is free, while the others go on.
     pub(super) fn publish(self: &Arc<Self>, frames: Vec<Frame>, shared: &Arc<Shared>) {
         let number = shared.number_a_frame();
         let threads = rayon::current_num_threads() as u64;
@@ -73,8 +73,8 @@ impl Frame {
         }
     }
 
-    /// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at rest; `None` if it
-    /// cannot be encoded.
+    /// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at
+    /// rest; `None` if it cannot be encoded.
     fn encode(&self) -> Option<Vec<u8>> {
         let Self { layer, ref colours, width, height, stage } = *self;
         let legend = &colours.legend.as_bytes()[..colours.legend.floor_char_boundary(255)];

@@ -1,7 +1,7 @@
 //! What is shown while the camera moves: few pixels, as many as can be traced and shown in a frame's time.
 //!
-//! A glimpse has the first sample that the whole picture has at every `step`-th pixel, on a film of its own. It is shown
-//! and thrown away; not for anything that is judged or kept.
+//! A glimpse has the first sample that the whole picture has at every `step`-th pixel, on a film of its own. It is
+//! shown and thrown away; not for anything that is judged or kept.
 
 use crate::film::Film;
 use crate::integrator::{BlockWork, Crop, PathTracer};

@@ -1,4 +1,4 @@
-//! What a viewer can look at.
+//! What a viewer can look at. How they are encoded is left to `frame`.
 
 use super::coarse::stand_in;
 use crate::film::{Film, PixelGuide};
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Layer {
-    /// As the display shows it.
+    /// The picture as the display shows it.
     Picture,
     /// Samples of each pixel.
     Samples,
@@ -35,7 +35,7 @@ pub(super) enum Layer {
 }
 
 impl Layer {
-    /// In the order of their declaration.
+    /// The layers in the order of their declaration.
     pub(super) const ALL: [Self; 10] = [
         Self::Picture,
         Self::Samples,
@@ -104,7 +104,7 @@ pub(super) fn velocity(to_next_px: &[Vec2], frames_per_second: f64) -> Colours {
     Colours { rgb8, legend }
 }
 
-/// For layers that are not known now, and why.
+/// A plain picture in place of a layer that is not known now, with why as its legend.
 pub(super) fn unknown(film: &Film, why: &str) -> Colours {
     let bytes = 3 * film.width() as usize * film.height() as usize;
     Colours { rgb8: vec![24; bytes], legend: why.to_owned() }
@@ -115,7 +115,7 @@ fn surfaces(film: &Film) -> impl Iterator<Item = &PixelGuide> {
     (0..film.guides().len()).map(|pixel| &film.guides()[stand_in(film, pixel).unwrap_or(pixel)])
 }
 
-/// For layers that need a look at the film which has not been taken.
+/// A plain picture in place of a layer that needs a look at the film which has not been taken.
 pub(super) fn nothing_yet(film: &Film) -> Colours {
     unknown(film, "known after the first look")
 }

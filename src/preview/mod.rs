@@ -1,7 +1,7 @@
 //! A live preview of a render in a browser.
 //!
-//! [`start`] renders on a thread of its own by the ordinary loop of [`crate::adaptive`], so that what stands at the end has
-//! the bytes of `fechner render`, and shows it to any number of viewers over a WebSocket. The order of work:
+//! [`start`] renders on a thread of its own by the ordinary loop of [`crate::adaptive`], so that what stands at the end
+//! has the bytes of `fechner render`, and shows it to any number of viewers over a WebSocket. The order of work:
 //!
 //! 1. while the camera moves, and at first, a `glimpse` of as many pixels as a frame has time for;
 //! 2. the loop, in batches of about 25 ms, between which `session` obeys what viewers ask; its pilot goes from coarse
@@ -9,8 +9,8 @@
 //! 3. `screen` turns film into encoded frames, at intervals that follow the picture's age and a frame's
 //!    price, and never more than viewers look at.
 //!
-//! Viewers get the latest frame and none that they missed, so a slow one costs nobody else anything. Not for pictures that
-//! should be kept or compared: `render` writes those, and so does "save" here.
+//! Viewers get the latest frame and none that they missed, so a slow one costs nobody else anything. Not for pictures
+//! that should be kept or compared: `render` writes those, and so does "save" here.
 
 mod audience;
 mod coarse;
@@ -48,7 +48,8 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Most pixels a side of a picture that is shown: a JPEG has 16 bits for them, and Chromium's canvas ends there, other browsers' earlier.
+/// Most pixels a side of a picture that is shown: a JPEG has 16 bits for them, and Chromium's canvas ends
+/// there, other browsers' earlier.
 pub const MOST_SIDE_PIXELS: u32 = u16::MAX as u32;
 
 /// A loaded scene and how to render it.
@@ -57,7 +58,7 @@ pub struct Job {
     pub scene: Arc<Scene>,
     /// How its samples are traced.
     pub trace: TraceSettings,
-    /// For whom, by which rule and operator.
+    /// Settings: for whom, by which rule and operator.
     pub record: SettingsRecord,
     /// Area in deg² over which the eye sums contrast, on whichever display; none is the display's own.
     pub csf_area_deg2: Option<f64>,
@@ -65,7 +66,8 @@ pub struct Job {
     pub limits: Limits,
     /// What thresholds are multiplied by.
     pub importance: Option<Plane>,
-    /// How light the whole is of which the picture is a part, seen by the scene's camera: what the operator is fitted to, whichever it is.
+    /// How light the whole is of which the picture is a part, seen by the scene's camera: what the operator is
+    /// fitted to, whichever it is.
     pub whole: Option<SceneLight>,
 }
 

@@ -1,4 +1,4 @@
-//! The camera in somebody's hand.
+//! The camera in somebody's hand: movements, and where they bring it. It renders nothing.
 
 use crate::scene::{Camera, CameraAxes, Projection};
 use glam::{Quat, Vec3};
@@ -47,7 +47,7 @@ pub(super) enum Movement {
 }
 
 impl Movement {
-    /// The same, told in heights of a part of the picture that is so many heights of it.
+    /// This movement told in heights of a part of the picture; `height`: of the part, in heights of the whole.
     pub(super) fn in_part(self, height: f32) -> Self {
         match self {
             Self::Pan { right, up } => Self::Pan { right: right * height, up: up * height },
@@ -251,7 +251,8 @@ mod tests {
         }
     }
 
-    /// A mirrored camera shows the mirror image of what another shows, wherever both are moved, and its text says that it does.
+    /// A mirrored camera shows the mirror image of what another shows, wherever both are moved, and its text says that
+    /// it does.
     #[test]
     fn mirrored_cameras_move_as_they_show() {
         let mut plain = held();

@@ -1,7 +1,7 @@
 //! Connections before they are a viewer's: few, and not for long.
 //!
-//! Anybody who reaches the port can open connections, token or not, and each takes one of the files that the process may have open.
-//! What a render keeps must never lack one for that.
+//! Anybody who reaches the port can open connections, token or not, and each takes one of the files that the process
+//! may have open. What a render keeps must never lack one for that.
 
 use crate::poison::Unpoisoned as _;
 use axum::extract::connect_info::Connected;
@@ -20,7 +20,7 @@ use tokio::time::Sleep;
 
 /// Connections that are nobody's yet; more wait in the system's queue, where they cost no file.
 const MOST_STRANGERS: usize = 16;
-/// So long a connection may take to ask for something and become a viewer's.
+/// Time that a connection may take to ask for something and become a viewer's.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Accepts connections as long as there are places.
@@ -64,7 +64,7 @@ struct Waiting {
 pub(super) struct Stranger(Arc<Mutex<Option<Waiting>>>);
 
 impl Stranger {
-    /// From here on the connection is a viewer's: it may stay, and its place is free.
+    /// Makes the connection a viewer's from here on: it may stay, and its place is free.
     pub(super) fn let_in(&self) {
         *self.0.lock().unpoisoned() = None;
     }

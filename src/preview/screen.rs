@@ -1,4 +1,4 @@
-//! From film to encoded frames of the layers that somebody looks at.
+//! From film to encoded frames of the layers that somebody looks at. Where they are sent is left to `shared`.
 
 use super::composed::Composed;
 use super::frame::{Encoding, Frame};
@@ -17,9 +17,10 @@ use glam::Vec2;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Bounds of [`best_interval`]: a batch is about as long as the least, and a picture that changes less often seems to be done.
+/// Bounds of [`best_interval`]: a batch is about as long as the least, and a picture that changes less often seems to
+/// be done.
 const BEST_INTERVALS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(500)];
-/// So long after a start intervals follow age and cost alone.
+/// Time after a start from which on intervals follow age and cost alone.
 const LIVELY: Duration = Duration::from_secs(2);
 /// Costs of a frame between two later on: a fortieth of the time.
 const COSTS_BETWEEN_FRAMES: u32 = 39;
@@ -31,7 +32,7 @@ const LONGEST_INTERVAL: Duration = Duration::from_secs(2);
 pub struct Looked {
     /// Standard error on the display, cd/m², that is at visibility 1.
     pub threshold: Plane,
-    /// Of the remaining noise.
+    /// Visibility of the remaining noise.
     pub visibility: Plane,
     /// The picture, where it is denoised: linear RGB in cd/m².
     pub denoised: Option<Arc<Vec<[f32; 3]>>>,
@@ -65,7 +66,7 @@ pub(super) struct Scenery<'a> {
     /// The operator's fit at the last look.
     pub(super) tone: Option<&'a SavedTone>,
     pub(super) settings: &'a LoopSettings,
-    /// At rest frames are exact.
+    /// Whether the film is on its way or at rest; at rest frames are exact.
     pub(super) stage: Stage,
     /// Pixels of the picture to each of the film's, each way.
     pub(super) step: u32,
@@ -75,9 +76,9 @@ pub(super) struct Scenery<'a> {
 pub(super) enum Motion {
     /// Nothing, and why.
     Unknown(&'static str),
-    /// To the next frame.
+    /// Motion to the next frame.
     Known {
-        /// In pixels, row-major.
+        /// Motion in pixels, row-major.
         to_next_px: Vec<Vec2>,
         /// How long a frame is.
         frames_per_second: f64,
@@ -110,8 +111,8 @@ struct ProvisionalTone {
 }
 
 impl ProvisionalTone {
-    /// Whether it still suits a picture of so many pixels and samples. A fit sorts the whole picture, and changes little while samples
-    /// do.
+    /// Whether it still suits a picture of so many pixels and samples. A fit sorts the whole picture, and
+    /// changes little while samples do.
     fn holds(&self, pixels: usize, samples: u64) -> bool {
         pixels == self.pixels && (self.samples..2 * self.samples).contains(&samples)
     }
@@ -147,7 +148,8 @@ impl Screen {
         self.provisional = None;
     }
 
-    /// Other eyes see other things in the same light: a denoised picture stays, and nothing else.
+    /// Forgets what other eyes saw: these see other things in the same light. A denoised picture stays, and nothing
+    /// else.
     pub(super) fn forget_eyes(&mut self) {
         let looked = self.looked.take().or_else(|| self.looked_before.take());
         self.forget_look();
@@ -278,13 +280,14 @@ fn interval(since_start: Duration, cost: Duration) -> Duration {
     if since_start < LIVELY { best } else { best.max(cost.saturating_mul(COSTS_BETWEEN_FRAMES).min(LONGEST_INTERVAL)) }
 }
 
-/// √(2 cost time): where what is on the screen is nearest to what might be there. It lacks, of its time, cost / interval for frames and
-/// half an interval / time for its age.
+/// √(2 cost time): where what is on the screen is nearest to what might be there. It lacks, of its time, cost /
+/// interval for frames and half an interval / time for its age.
 fn best_interval(since_start: Duration, cost: Duration) -> Duration {
     Duration::from_secs_f64((2.0 * cost.as_secs_f64() * since_start.as_secs_f64()).sqrt())
 }
 
-/// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's; a part is shown as its whole.
+/// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's; a
+/// part is shown as its whole.
 fn fit(settings: &LoopSettings, step: u32, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Box<dyn FittedTone> {
     if let Some(whole) = settings.fitted.clone().filter(|_| step == 1) {
         return whole.restore();

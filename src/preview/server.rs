@@ -20,7 +20,7 @@ const PAGE: &str = include_str!("page.html");
 const LARGEST_MESSAGE_BYTES: usize = 1 << 14;
 /// Viewers at a time; more are refused.
 const MOST_VIEWERS: u32 = 64;
-/// So long viewers may take for the last frame when the preview closes.
+/// Time that viewers may take for the last frame when the preview closes.
 const FAREWELL: Duration = Duration::from_secs(1);
 
 /// Who is let in.
@@ -80,8 +80,9 @@ pub(super) fn serve(listener: TcpListener, door: Door, shared: Arc<Shared>) -> s
 }
 
 impl Door {
-    /// Whether a request may come in. The token keeps other users and programs out; the origin other hosts' pages, which
-    /// a browser that knows the token would otherwise let in; the host's name those that have their name point here.
+    /// Whether a request may come in. The token keeps other users and programs out; the origin other hosts' pages,
+    /// which a browser that knows the token would otherwise let in; the host's name those that have their name point
+    /// here.
     fn admits(&self, headers: &HeaderMap, ticket: &Ticket) -> bool {
         let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
         let Some(host) = text(header::HOST) else { return false };

@@ -42,8 +42,8 @@ use std::time::{Duration, Instant};
 pub(super) use telling::{blank_status, count, in_words, publish};
 use watch::{Moving, Watch};
 
-/// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved scene file
-/// starts it again.
+/// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved
+/// scene file starts it again.
 pub(super) fn run(job: Job, host: &Arc<dyn Host>, mut options: Options, shared: &Arc<Shared>) {
     let mut next = Some(job);
     while !shared.is_closing() {
@@ -182,8 +182,8 @@ impl<'a> Session<'a> {
         self.forget_motion();
     }
 
-    /// Fits tone to the whole as it is seen from here, as `render` would. From home the job knows it; if it does not, there is no whole, or
-    /// it is too large to be looked at.
+    /// Fits tone to the whole as it is seen from here, as `render` would. From home the job knows it; if it does not,
+    /// there is no whole, or it is too large to be looked at.
     fn fit_to_whole(&mut self) {
         self.whole_from_elsewhere = self.job.whole.as_ref().filter(|_| !self.hand.held.is_home).map(|_| {
             // Films of other seeds are shown alike.
@@ -275,7 +275,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// The same settings, whose looks end when somebody wants another picture.
+/// These settings, with looks that end when somebody wants another picture.
 fn interruptible(settings: LoopSettings, shared: &Arc<Shared>) -> LoopSettings {
     let shared = Arc::clone(shared);
     LoopSettings { is_outdated: Some(Box::new(move || shared.is_outdated())), ..settings }

@@ -18,7 +18,7 @@ const MOST_COMMANDS: usize = 1024;
 /// A frame as viewers are sent it; without bytes before the first.
 #[derive(Default)]
 pub(super) struct Encoded {
-    /// Its place in the order in which frames are made; they may be encoded by several threads.
+    /// Number of the frame in the order in which frames are made; they may be encoded by several threads.
     pub(super) number: u64,
     pub(super) bytes: Bytes,
 }
@@ -77,7 +77,7 @@ impl Shared {
         self.is_closing() || !self.commands.lock().unpoisoned().is_empty()
     }
 
-    /// All commands that have come.
+    /// Takes all commands that have come.
     pub(super) fn take_commands(&self) -> VecDeque<Command> {
         let mut commands = self.commands.lock().unpoisoned();
         self.is_outdated.store(false, Ordering::SeqCst);
@@ -89,7 +89,7 @@ impl Shared {
         self.is_closing() || self.is_outdated.load(Ordering::SeqCst)
     }
 
-    /// Until a command comes, the preview closes or the time is up.
+    /// Waits until a command comes, the preview closes or the time is up.
     pub(super) fn wait(&self, most: Duration) {
         let commands = self.commands.lock().unpoisoned();
         if commands.is_empty() && !self.is_closing() {

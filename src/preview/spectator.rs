@@ -3,7 +3,7 @@
 use super::screen::Looked;
 use crate::film::Film;
 
-/// Is shown each frame on the render's own thread, and so must be quick.
+/// A spectator, who is shown each frame on the render's own thread, and so must be quick.
 pub trait Spectator: Send {
     /// A frame.
     fn shown(&mut self, shown: &Shown<'_>);
@@ -14,7 +14,8 @@ pub trait Spectator: Send {
 pub struct Shown<'a> {
     /// Samples; while the camera moves, of fewer pixels than the picture has.
     pub film: &'a Film,
-    /// The picture, linear RGB in cd/m², of the film's size: where a pixel has no samples, another's; denoised where asked for.
+    /// The picture, linear RGB in cd/m², of the film's size: where a pixel has no samples, another's;
+    /// denoised where asked for.
     pub rgb_cd_m2: &'a [[f32; 3]],
     /// Pixels of the picture to each of the film's, each way.
     pub step: u32,

@@ -1,7 +1,7 @@
 //! The picture and its layers in tev, the viewer that rendering people use, over its own protocol.
 //!
-//! A thread of its own sends the latest state and none that it missed. A tev that is not there, or goes away, is told about once;
-//! the render never waits for it, except that its end is given [`FAREWELL`] to arrive.
+//! A thread of its own sends the latest state and none that it missed. A tev that is not there, or goes away, is told
+//! about once; the render never waits for it, except that its end is given [`FAREWELL`] to arrive.
 
 mod packet;
 #[cfg(test)]
@@ -60,7 +60,8 @@ pub struct Tev {
 }
 
 impl Tev {
-    /// Connects from a thread of its own. `name` is what tev lists; `warn` is told, once, if it cannot be reached, or not any more.
+    /// Connects from a thread of its own. `name` is what tev lists; `warn` is told, once, if it cannot be
+    /// reached, or not any more.
     ///
     /// # Errors
     /// If the system gives no thread.

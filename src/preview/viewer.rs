@@ -1,4 +1,4 @@
-//! One viewer: what a browser is sent, and what it says.
+//! One viewer: what a browser is sent, and what it says. What it asks for is done by the session.
 
 use super::command::{Command, Inspected};
 use super::layer::Layer;
@@ -73,8 +73,8 @@ impl Viewer {
     }
 }
 
-/// Serves one viewer until it goes, or the preview closes and it has the last frame. It is sent the latest frame whenever it has taken
-/// the one before.
+/// Serves one viewer until it goes, or the preview closes and it has the last frame. It is sent the latest frame
+/// whenever it has taken the one before.
 pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
     let mut status = shared.status();
     let mut closing = shared.until_closing();

@@ -1,5 +1,5 @@
-//! Pixel filters, importance sampled: each sample belongs to one pixel alone, so pixels stay independent and their noise
-//! stays white, which is what the threshold model assumes.
+//! Pixel filters, importance sampled: each sample belongs to one pixel alone, so pixels stay independent and their
+//! noise stays white, which is what the threshold model assumes.
 //!
 //! A filter with negative lobes is sampled by its absolute value, and its samples carry a sign. Their scatter is then
 //! that of the signs, too, which no perception model should judge: adaptive sampling refuses such filters.
@@ -17,17 +17,18 @@ pub enum PixelFilter {
     /// Gaussian of σ 0.45 pixels, cut at 1.5 pixels (weight 0.4 % there): softer edges.
     #[default]
     Gaussian,
-    /// The four-term window of Blackman and Harris, 3 pixels wide and separable (Harris 1978): sharper than the Gaussian,
-    /// without its cut.
+    /// The four-term window of Blackman and Harris, 3 pixels wide and separable (Harris 1978): sharper than the
+    /// Gaussian, without its cut.
     BlackmanHarris,
-    /// The cubic with B = C = 1/3, 4 pixels wide and separable (Mitchell and Netravali 1988): sharpest, with negative lobes.
+    /// The cubic with B = C = 1/3, 4 pixels wide and separable (Mitchell and Netravali 1988): sharpest, with negative
+    /// lobes.
     Mitchell,
 }
 
 /// Where in the picture a sample looks, and what it counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
-    /// From the pixel's centre, in pixels.
+    /// Place that is looked at, from the pixel's centre, in pixels.
     pub offset: Vec2,
     /// Multiplies the sample's radiance; its mean is 1.
     pub weight: f32,
@@ -49,7 +50,7 @@ impl FilterDensity {
     }
 }
 
-/// Of any filter.
+/// Widest radius of any filter, pixels.
 const WIDEST_RADIUS_PX: f32 = 2.0;
 const GAUSSIAN_SIGMA_PX: f32 = 0.45;
 const GAUSSIAN_RADIUS_PX: f32 = 1.5;
@@ -58,7 +59,7 @@ static BLACKMAN_HARRIS: LazyLock<Profile> = LazyLock::new(|| Profile::new(1.5, b
 static MITCHELL: LazyLock<Profile> = LazyLock::new(|| Profile::new(WIDEST_RADIUS_PX, mitchell));
 
 impl PixelFilter {
-    /// Its name for people.
+    /// Name of the filter, for people.
     pub fn in_words(self) -> &'static str {
         match self {
             Self::Box => "box",
@@ -82,7 +83,7 @@ impl PixelFilter {
         }
     }
 
-    /// Its height along an axis, of any scale, 0 beyond its radius.
+    /// Height of the filter along an axis, of any scale, 0 beyond its radius.
     pub fn height(self, offset_px: f32) -> f32 {
         let within = |radius_px: f32, height: f32| if offset_px.abs() < radius_px { height } else { 0.0 };
         match self {

@@ -1,7 +1,7 @@
 //! Where samples come from: Owen-scrambled Sobol points that are pure functions of their key.
 //!
-//! A render asks for points by [`BlockKey`] and index, never by a running state, so that any thread, any machine and any
-//! order of work make the same numbers. Each pixel takes its samples in blocks of a power of two; every block is a
+//! A render asks for points by [`BlockKey`] and index, never by a running state, so that any thread, any machine and
+//! any order of work make the same numbers. Each pixel takes its samples in blocks of a power of two; every block is a
 //! scrambled (t, m, s)-net of its own, so a pixel that stops early loses nothing of the stratification of what it has.
 //!
 //! Not for: more than four jointly stratified dimensions. Groups of four are padded against each other (independent
@@ -22,17 +22,17 @@ pub enum Sequence {
     /// Owen-scrambled Sobol points, every block of every pixel scrambled by itself: neighbours are independent.
     #[default]
     PerPixel,
-    /// Owen-scrambled Sobol points, one sequence for the blocks of a level in 128 × 128 pixels (fewer where a block has more than
-    /// 2¹⁸ samples), handed out along a shuffled Z-curve: blocks of neighbours together are well spread too, which moves the error to high frequencies
-    /// (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of
-    /// Pixels", 2020).
+    /// Owen-scrambled Sobol points, one sequence for the blocks of a level in 128 × 128 pixels (fewer where a block has
+    /// more than 2¹⁸ samples), handed out along a shuffled Z-curve: blocks of neighbours together are well spread too,
+    /// which moves the error to high frequencies (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
+    /// Sampling Error via Hierarchical Ordering of Pixels", 2020).
     ZOrder,
     /// Independent random numbers: for tests that need variances to be what textbooks say.
     Independent,
 }
 
 impl Sequence {
-    /// Its name for people.
+    /// Name of the sequence, for people.
     pub fn in_words(self) -> &'static str {
         match self {
             Self::PerPixel => "per pixel",
@@ -52,7 +52,7 @@ pub enum Half {
 }
 
 impl Half {
-    /// Both, in merge order.
+    /// Both halves, in merge order.
     pub const BOTH: [Half; 2] = [Half::A, Half::B];
 
     /// 0 or 1.
@@ -141,7 +141,8 @@ pub struct Sample {
 const MOST_TILE_BITS: u32 = 7;
 
 impl BlockKey {
-    /// Names the samples, at most 16, of what is asked before a render. `stream`: a seed of its own, so that they are not those of pictures.
+    /// Names the samples, at most 16, of what is asked before a render. `stream`: a seed of its own, so that they
+    /// are not those of pictures.
     pub fn of_probe(stream: u64, number: Pixel) -> Self {
         Self { seed: stream, pixel: number, half: Half::A, level: 0, log2_samples: 4, sequence: Sequence::PerPixel }
     }
@@ -167,8 +168,8 @@ impl BlockKey {
         }
     }
 
-    /// log₂ of the side of the squares of pixels that share this block's sequence: smaller where its samples leave less room in an
-    /// index, or pixels 64 apart would share the samples of a block of 2¹⁹.
+    /// log₂ of the side of the squares of pixels that share this block's sequence: smaller where its samples leave less
+    /// room in an index, or pixels 64 apart would share the samples of a block of 2¹⁹.
     fn tile_bits(self) -> u32 {
         MOST_TILE_BITS.min((u32::BITS - u32::from(self.log2_samples)) / 2)
     }
@@ -207,8 +208,8 @@ impl Sample {
         }
     }
 
-    /// [`Self::draw`] for several samples, eight at a time, into the first of at least as many `numbers`: of few or of many, a sample's
-    /// numbers are the same.
+    /// [`Self::draw`] for several samples, eight at a time, into the first of at least as many `numbers`: of few or of
+    /// many, a sample's numbers are the same.
     pub fn draw_each(samples: &[Self], purpose: Purpose, numbers: &mut [[f32; 4]]) {
         with_vectors(DrawEach { samples, purpose, numbers });
     }
@@ -259,13 +260,13 @@ pub(crate) fn hash_words(hash: u64, word: u64) -> u64 {
 /// Between two neighbours of the 2^24 numbers in [0, 1) that f32 has evenly spread.
 const STEP_OF_24_BITS: f32 = 1.0 / 16_777_216.0;
 
-/// To [0, 1) with the 24 bits that f32 holds.
+/// Maps a hash to [0, 1) with the 24 bits that f32 holds.
 #[inline(always)]
 pub(crate) fn unit_of_hash(hash: u64) -> f32 {
     (hash >> 40) as f32 * STEP_OF_24_BITS
 }
 
-/// To [0, 1) with the 53 bits that f64 holds.
+/// Maps a hash to [0, 1) with the 53 bits that f64 holds.
 pub(crate) fn unit_f64_of_hash(hash: u64) -> f64 {
     (hash >> 11) as f64 / (1_u64 << 53) as f64
 }

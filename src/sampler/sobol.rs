@@ -69,11 +69,12 @@ pub(super) type Points<T, const N: usize> = [[T; N]; 4];
 
 /// The points with these bit-reversed indices, their digits reversed too.
 ///
-/// Without tables, whose 16 KiB took half of a core's fastest cache and whose rows do not go in vectors.
+/// Without tables, whose 16 KiB would take half of a core's fastest cache and whose rows do not go in vectors.
 #[inline(always)]
 fn reversed_points<const N: usize>(reversed_indices: [u32; N]) -> Points<u32, N> {
     let indices = reversed_indices.map(u32::reverse_bits);
-    // Pascal's triangle modulo 2: digit i is the sum of the index's bits j of which i is a subset, a factor for each bit of j.
+    // Pascal's triangle modulo 2: digit i is the sum of the index's bits j of which i is a subset, a factor for each
+    // bit of j.
     let mut second = indices;
     for (shift, having) in [(1, 0xaaaa_aaaa), (2, 0xcccc_cccc), (4, 0xf0f0_f0f0), (8, 0xff00_ff00), (16, 0xffff_0000)] {
         second = second.map(|digits| digits ^ (digits & having) >> shift);
@@ -96,8 +97,8 @@ fn to_unit(reversed: u32) -> f32 {
     (reversed.reverse_bits() >> 8) as i32 as f32 * STEP_OF_24_BITS
 }
 
-/// The four numbers in [0, 1) of each of `N` samples, at bit-reversed indices of the Sobol sequence, its order and digits scrambled
-/// by a seed of each.
+/// The four numbers in [0, 1) of each of `N` samples, at bit-reversed indices of the Sobol sequence, its order and
+/// digits scrambled by a seed of each.
 #[inline(always)]
 pub(super) fn scrambled_points<const N: usize>(reversed_indices: [u32; N], seeds: [u32; N]) -> Points<f32, N> {
     let order: [u32; N] = from_fn(|lane| hash_low_to_high(reversed_indices[lane], seeds[lane]));

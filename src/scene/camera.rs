@@ -55,7 +55,7 @@ pub struct ScreenWindow {
 /// Unit directions of a camera in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraAxes {
-    /// Into the picture.
+    /// Direction into the picture.
     pub forward: Vec3,
     /// Along its rows, from left to right.
     pub right: Vec3,
@@ -63,7 +63,7 @@ pub struct CameraAxes {
     pub up: Vec3,
 }
 
-/// To the right of who looks along `forward`; any right where `up` is parallel to it.
+/// Direction to the right of who looks along `forward`; any right where `up` is parallel to it.
 pub(crate) fn right_of(forward: Vec3, up: Vec3) -> Vec3 {
     forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector())
 }
@@ -108,7 +108,7 @@ impl Camera {
         }
     }
 
-    /// The same camera with a view so many times as high, but never lower than it is.
+    /// This camera with a view so many times as high, but never lower than it is.
     pub fn heightened(self, times: f32) -> Self {
         let times = times.max(1.0);
         let projection = match self.projection {

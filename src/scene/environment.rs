@@ -92,7 +92,8 @@ impl Parametrisation {
         }
     }
 
-    /// A unit direction in one row of a picture of so many, uniform in solid angle for `along` the row and `across` it in [0, 1].
+    /// A unit direction in one row of a picture of so many, uniform in solid angle for `along` the row and `across` it
+    /// in [0, 1].
     pub fn direction_in_row(self, row: u32, rows: u32, along: f32, across: f32) -> Vec3 {
         let (row, rows) = (row as f32, rows as f32);
         match self {
@@ -115,7 +116,7 @@ impl Parametrisation {
 }
 
 impl Environment {
-    /// The same radiance from everywhere, in scene units.
+    /// An environment of the same radiance from everywhere, in scene units.
     pub fn constant(radiance: Vec3) -> Self {
         Self {
             parametrisation: Parametrisation::LatLong,
@@ -174,8 +175,8 @@ impl Environment {
         row as usize * self.width as usize + column as usize
     }
 
-    /// Irradiance on a surface that faces along the world direction `normal`, from texel centres: what formats that give
-    /// an illuminance scale by.
+    /// Irradiance on a surface that faces along the world direction `normal`, from texel centres: what formats that
+    /// give an illuminance scale by.
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
         let mut sum = glam::DVec3::ZERO;
         for row in 0..self.height {
@@ -272,7 +273,8 @@ mod tests {
         }
     }
 
-    /// Where rows are narrow, too, at the poles of a picture of 4096×2048: what is drawn from a row is found in it, evenly.
+    /// Where rows are narrow, too, at the poles of a picture of 4096×2048: what is drawn from a row is found in it,
+    /// evenly.
     #[test]
     fn samples_of_a_row_lie_in_it() {
         let height = 2048;

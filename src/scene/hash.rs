@@ -1,4 +1,5 @@
-//! What a scene is, in 32 bytes: equal content gives equal hashes, whatever its files, objects and materials are called.
+//! What a scene is, in 32 bytes: equal content gives equal hashes, whatever its files, objects and materials are
+//! called.
 //!
 //! Not for comparing machines of different byte order: large arrays are hashed as they stand in memory.
 
@@ -48,12 +49,12 @@ impl std::fmt::Debug for ContentHash {
 }
 
 impl ContentHash {
-    /// Of bytes.
+    /// Hash of bytes.
     pub fn of_bytes(bytes: &[u8]) -> Self {
         Self(*blake3::hash(bytes).as_bytes())
     }
 
-    /// Of an array of numbers.
+    /// Hash of an array of numbers.
     pub fn of_values(values: &[f32]) -> Self {
         let mut hasher = blake3::Hasher::new();
         hash_array(&mut hasher, values);
@@ -61,8 +62,9 @@ impl ContentHash {
     }
 }
 
-/// Hashes a scene, less what no sample depends on: its name, its parts' names and its notes, the seconds of a shutter that motions
-/// hold already, and what it asks for when the command line does not. Objects are numbered by their order, not by name.
+/// Hashes a scene, less what no sample depends on: its name, its parts' names and its notes, the seconds of a
+/// shutter that motions hold already, and what it asks for when the command line does not. Objects are numbered by
+/// their order, not by name.
 ///
 /// Large arrays are hashed as bytes, and all else as its `Debug` text, which is exact for floats and holds every field:
 /// one that is added to a type is covered without a word here. Takes a copy of the scene's arrays while it runs.

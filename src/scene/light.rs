@@ -28,8 +28,8 @@ pub enum Light {
         /// What happens between the two.
         falloff: SpotFalloff,
     },
-    /// Shines from infinitely far away: a direction, or a disc of uniform radiance around it such as the sun's, which is
-    /// then seen where a ray meets no surface.
+    /// Shines from infinitely far away: a direction, or a disc of uniform radiance around it such as the sun's, which
+    /// is then seen where a ray meets no surface.
     Directional {
         /// Unit direction in which the light travels.
         direction: Vec3,
@@ -103,7 +103,8 @@ fn versine_of(angle: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// The closed forms against the falloff itself, summed over the cap: cones of a hundredth of a degree kept none of their lumen.
+    /// The closed forms against the falloff itself, summed over the cap. Regression: cones of a hundredth of a degree
+    /// kept none of their lumen.
     #[test]
     fn solid_angles_are_the_integral_of_the_falloff() {
         let sharp = [0.01, 0.1].map(f32::to_radians);

@@ -1,4 +1,5 @@
 //! Materials: how a surface scatters, emits and covers, and what a renderer asks of them besides values at a point.
+//! What there is at a point is left to the integrator.
 
 use super::{ColorInput, Relief, ScalarInput, Surface, Texture, TextureId, TextureLookup};
 use glam::{Vec2, Vec3};
@@ -32,8 +33,8 @@ pub struct StretchDirection {
 }
 
 impl StretchDirection {
-    /// Components along growing u and falling v at texture coordinates; of no particular length, (1, 0) where the picture has no
-    /// direction.
+    /// Components along growing u and falling v at texture coordinates; of no particular length, (1, 0) where the
+    /// picture has no direction.
     pub fn evaluate(&self, textures: &[Texture], uv: Vec2) -> Vec2 {
         let mapped = self.map.map_or(Vec2::X, |map| {
             let texel = textures[map.texture.0 as usize].sample_rgba(map.transform(uv));
@@ -80,7 +81,7 @@ impl Material {
         }
     }
 
-    /// Its relief and that of its coat.
+    /// Reliefs of the material and of its coat.
     pub fn reliefs(&self) -> impl Iterator<Item = &Relief> {
         let of_coat = match &self.surface {
             Surface::MetalRoughness(model) => model.own_coat_relief(),

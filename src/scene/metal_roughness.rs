@@ -1,4 +1,4 @@
-//! The metal-roughness model of glTF 2.0, as scene files tell it.
+//! The metal-roughness model of glTF 2.0, as scene files tell it. How it scatters is left to `bsdf`.
 
 use super::{ColorInput, Relief, ScalarInput, USUAL_IOR};
 use glam::Vec3;
@@ -6,7 +6,7 @@ use glam::Vec3;
 /// Which normal a clear coat has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CoatRelief {
-    /// That of what it covers.
+    /// The relief of what the coat covers.
     OfBase,
     /// The mesh's, or that of a relief of its own: lacquer is smooth over bumps.
     Own(Option<Relief>),
@@ -21,10 +21,11 @@ pub struct MetalRoughness {
     pub metallic: ScalarInput,
     /// Perceptual roughness in [0, 1].
     pub roughness: ScalarInput,
-    /// Index of refraction of the dielectric part: [`USUAL_IOR`] unless told, as [`MetalRoughness::problem_with_ior`] takes it.
+    /// Index of refraction of the dielectric part: [`USUAL_IOR`] unless told, as
+    /// [`MetalRoughness::problem_with_ior`] takes it.
     pub ior: f32,
-    /// Share of the dielectric part's light that goes through, not into diffuse reflection: straight through a thin sheet, or
-    /// refracted into a volume if there is one.
+    /// Share of the dielectric part's light that goes through, not into diffuse reflection: straight through a thin
+    /// sheet, or refracted into a volume if there is one.
     pub transmission: ScalarInput,
     /// Absorption per scene unit of the volume behind the surface; `None` for a thin sheet.
     pub volume: Option<Vec3>,
@@ -32,17 +33,17 @@ pub struct MetalRoughness {
     pub specular: ScalarInput,
     /// Tint of the dielectric's reflection face on.
     pub specular_color: ColorInput,
-    /// In [0, 1]: facets are stretched along the tangent, which the material's stretch direction turns.
+    /// Stretch of facets in [0, 1] along the tangent, which the material's stretch direction turns.
     pub anisotropy: ScalarInput,
     /// Coverage of a clear coat of index 1.5, in [0, 1].
     pub clearcoat: ScalarInput,
-    /// Its perceptual roughness in [0, 1].
+    /// Perceptual roughness of the coat in [0, 1].
     pub clearcoat_roughness: ScalarInput,
-    /// Its normal.
+    /// Normal of the coat.
     pub coat_relief: CoatRelief,
     /// Albedo of fibres that stand on the surface, in [0, 1].
     pub sheen_color: ColorInput,
-    /// Their perceptual roughness in [0, 1].
+    /// Perceptual roughness of the sheen's fibres in [0, 1].
     pub sheen_roughness: ScalarInput,
 }
 

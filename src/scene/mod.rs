@@ -47,13 +47,13 @@ pub struct MaterialId(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TextureId(pub u32);
 
-/// What [`Scene::nits_per_unit`] may be, with room on both sides of any unit in use: beyond it single-precision variances in (cd/m²)²
-/// vanish or are infinite, and nothing can be said of noise.
+/// What [`Scene::nits_per_unit`] may be, with room on both sides of any unit in use: beyond it single-precision
+/// variances in (cd/m²)² vanish or are infinite, and nothing can be said of noise.
 pub const NITS_PER_UNIT: RangeInclusive<f64> = 1e-6..=1e9;
-/// Most that exposure may be corrected by, up or down.
+/// Stops that exposure may be corrected by at most, up or down.
 pub const MOST_EXPOSURE_STOPS: f64 = 100.0;
 
-/// Everything that is rendered, in memory.
+/// What is rendered, in memory: geometry, materials, lights and camera.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The scene's name, for reports.
@@ -78,8 +78,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Decoded textures.
     pub textures: Vec<Texture>,
-    /// Whether the second axis of normal maps is normal × growing u whichever way v runs, as in pbrt and Mitsuba; else it is that
-    /// of falling v.
+    /// Whether the second axis of normal maps is normal × growing u whichever way v runs, as in pbrt and Mitsuba;
+    /// else it is that of falling v.
     pub bitangent_ignores_v: bool,
     /// Point, spot and directional lights, and the sun's disc. Area lights are surfaces whose material emits.
     pub lights: Vec<Light>,
@@ -120,7 +120,8 @@ impl Scene {
             || self.spheres.iter().any(|sphere| sphere.motion.is_some())
     }
 
-    /// Puts surroundings, and their sun if there is one, in the place of those that it has: the old sun sets with its sky.
+    /// Puts surroundings, and their sun if there is one, in the place of those that it has: the old sun sets with its
+    /// sky.
     pub fn surround(&mut self, environment: Environment, sun: Option<Light>) {
         self.environment = Some(environment);
         self.lights.retain(|light| !matches!(light, Light::Directional { is_of_sky: true, .. }));
@@ -208,7 +209,8 @@ pub struct Sphere {
     pub center: Vec3,
     /// Radius in scene units, above 0.
     pub radius: f32,
-    /// Its own axes in the world: orthonormal, mirrored where its transform mirrors. Pictures lie around its own y.
+    /// Axes of the sphere in the world: orthonormal, mirrored where its transform mirrors. Pictures lie around its own
+    /// y.
     pub axes: Mat3A,
     /// Which material.
     pub material: MaterialId,
@@ -223,7 +225,7 @@ pub struct SpherePlace {
     pub center: Vec3A,
     /// Radius in scene units, above 0.
     pub radius: f32,
-    /// Its own axes, orthonormal.
+    /// Axes of the sphere at that moment, orthonormal.
     pub axes: Mat3A,
 }
 
@@ -234,7 +236,8 @@ impl Sphere {
         Mat3A::from_cols(x_axis.normalize_or(Vec3A::X), y_axis.normalize_or(Vec3A::Y), z_axis.normalize_or(Vec3A::Z))
     }
 
-    /// The same where the format's spheres have their poles on their own z and count their turn from x to y (pbrt, Mitsuba).
+    /// The axes of a sphere that a similarity has put into the world, where the format's spheres have their poles on
+    /// their own z and count their turn from x to y (pbrt, Mitsuba).
     pub fn axes_with_poles_on_z(to_world: &Affine3A) -> Mat3A {
         let axes = Self::axes_of(to_world);
         Mat3A::from_cols(axes.x_axis, axes.z_axis, -axes.y_axis)
@@ -254,8 +257,8 @@ impl Sphere {
 }
 
 impl SpherePlace {
-    /// Texture coordinates where the unit normal is `normal`, as those of the mesh that stands in for a sphere: u runs from its own
-    /// +x against the clock seen from its own +y, v from +y down.
+    /// Texture coordinates where the unit normal is `normal`, as those of the mesh that stands in for a sphere: u runs
+    /// from its own +x against the clock seen from its own +y, v from +y down.
     pub fn uv(&self, normal: Vec3A) -> Vec2 {
         let own = self.axes.transpose() * normal;
         let turn = (-own.z).atan2(own.x) / TAU;
@@ -295,14 +298,14 @@ pub struct TextureLookup {
 }
 
 impl ColorInput {
-    /// The same colour everywhere.
+    /// An input that is the same colour everywhere.
     pub const fn constant(factor: Vec3) -> Self {
         Self { factor, texture: None }
     }
 }
 
 impl ScalarInput {
-    /// The same value everywhere.
+    /// An input that is the same value everywhere.
     pub const fn constant(factor: f32) -> Self {
         Self { factor, texture: None }
     }

@@ -1,5 +1,5 @@
-//! Motion while the shutter is open: rigid poses (with a stretch) between which translation and stretch move linearly and
-//! rotation turns by slerp. Not for deforming meshes, which do not blur.
+//! Motion while the shutter is open: rigid poses (with a stretch) between which translation and stretch move linearly
+//! and rotation turns by slerp. Not for deforming meshes, which do not blur.
 
 use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
 
@@ -17,7 +17,7 @@ pub struct Pose {
 /// A pose at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionKey {
-    /// As share of the shutter: it opens at 0 and closes at 1.
+    /// Time as share of the shutter: it opens at 0 and closes at 1.
     pub time: f32,
     /// The pose.
     pub pose: Pose,
@@ -55,7 +55,7 @@ impl Pose {
         }
     }
 
-    /// From scale, rotation and translation.
+    /// A pose of scale, rotation and translation.
     pub fn from_parts(scale: Vec3, rotation: Quat, translation: Vec3) -> Self {
         Self { translation: translation.into(), rotation, stretch: Mat3A::from_diagonal(scale) }
     }
@@ -65,7 +65,7 @@ impl Pose {
         Affine3A { matrix3: Mat3A::from_quat(self.rotation) * self.stretch, translation: self.translation }
     }
 
-    /// Between this pose (share 0) and another (share 1).
+    /// The pose between this one (share 0) and another (share 1).
     pub fn interpolate(self, other: Self, share: f32) -> Self {
         Self {
             translation: self.translation.lerp(other.translation, share),
@@ -76,13 +76,14 @@ impl Pose {
 }
 
 impl Motion {
-    /// `before`, then the pose. `None` where there is no key, or the keys' times do not increase.
+    /// A motion that is `before`, then the pose between its keys. `None` where there is no key, or the keys' times do
+    /// not increase.
     pub fn new(before: Affine3A, keys: Vec<MotionKey>) -> Option<Self> {
         let increasing = keys.windows(2).all(|pair| pair[0].time < pair[1].time);
         (!keys.is_empty() && increasing).then_some(Self { before, keys })
     }
 
-    /// From one transform when the shutter opens to another when it closes.
+    /// A motion from one transform when the shutter opens to another when it closes.
     pub fn between(open: Affine3A, close: Affine3A) -> Self {
         let key = |time, transform| MotionKey { time, pose: Pose::decompose(transform) };
         Self { before: Affine3A::IDENTITY, keys: vec![key(0.0, open), key(1.0, close)] }
@@ -101,7 +102,7 @@ impl Motion {
         if span > 0.0 { from.pose.interpolate(to.pose, ((time - from.time) / span).clamp(0.0, 1.0)) } else { from.pose }
     }
 
-    /// The same motion for things that are given as they are when the shutter opens: the identity at time 0.
+    /// This motion for things that are given as they are when the shutter opens: the identity at time 0.
     pub fn since_open(&self) -> Self {
         Self { before: self.before * self.at(0.0).inverse(), keys: self.keys.clone() }
     }
@@ -121,9 +122,9 @@ impl Motion {
         open == close && self.keys.iter().filter(|k| (0.0..1.0).contains(&k.time)).all(|k| self.at(k.time) == open)
     }
 
-    /// Calls `visit` with balls (centre, radius) whose hull holds every place where the hull of `points` can be while the
-    /// shutter is open. Between substeps a point leaves its chord by at most h²/8 · max|p″|,
-    /// and |p″| ≤ ω²|Sx| + 2ω|S′x| for a rotation at the speed ω of a stretch S that changes at the speed S′.
+    /// Calls `visit` with balls (centre, radius) whose hull holds every place where the hull of `points` can be while
+    /// the shutter is open. Between substeps a point leaves its chord by at most h²/8 · max|p″|, and
+    /// |p″| ≤ ω²|Sx| + 2ω|S′x| for a rotation at the speed ω of a stretch S that changes at the speed S′.
     pub fn sweep(&self, points: &[Vec3A], mut visit: impl FnMut(Vec3A, f32)) {
         const STEPS: u16 = 16;
         let inner = self.keys.iter().map(|k| k.time).filter(|t| (0.0..1.0).contains(t));

@@ -1,4 +1,4 @@
-//! How a picture lies on a triangle, by its texture coordinates.
+//! Tells how a picture lies on a triangle, by its texture coordinates.
 
 use glam::{Vec2, Vec3};
 

@@ -1,5 +1,5 @@
-//! Reliefs that only shading knows of: normal maps and height maps. The surface itself, its silhouette and its shadows stay
-//! as they are; where those are seen, the mesh must have the shape.
+//! Reliefs that only shading knows of: normal maps and height maps. The surface itself, its silhouette and its shadows
+//! stay as they are; where those are seen, the mesh must have the shape.
 
 use super::{ScalarInput, Texture, TextureLookup};
 use glam::{Vec2, Vec3};
@@ -23,7 +23,7 @@ pub enum Relief {
 pub struct HeightMap {
     /// The height; negative is a dent.
     pub height: ScalarInput,
-    /// In what it is measured.
+    /// Unit of the heights.
     pub unit: HeightUnit,
 }
 
@@ -32,7 +32,8 @@ pub struct HeightMap {
 pub enum HeightUnit {
     /// One unit of the scene (world space), however large the picture is on the surface.
     Scene,
-    /// As high as the picture is wide where it lies on the surface, so that slopes do not depend on the scene's unit.
+    /// A height of 1 is as high as the picture is wide where it lies on the surface, so that slopes do not
+    /// depend on the scene's unit.
     PictureWidth,
 }
 
@@ -49,8 +50,9 @@ impl Relief {
 impl HeightMap {
     /// ∂h/∂u and ∂h/∂v at texture coordinates; zero where there is no picture. Always finite for finite heights.
     ///
-    /// Differences over one texel, half to each side. Of a bilinear picture that is the slope of its quadratic B-spline: normals
-    /// are continuous, where the slope of the bilinear surface itself jumps at every texel's centre and shows facets.
+    /// Differences over one texel, half to each side. Of a bilinear picture that is the slope of its
+    /// quadratic B-spline: normals are continuous, where the slope of the bilinear surface itself jumps at
+    /// every texel's centre and shows facets.
     pub fn gradient(&self, textures: &[Texture], uv: Vec2) -> Vec2 {
         let Some((lookup, channel)) = &self.height.texture else { return Vec2::ZERO };
         let texture = &textures[lookup.texture.0 as usize];
@@ -73,8 +75,8 @@ impl TextureLookup {
         self.scale * Vec2::new(cos * along.x - sin * along.y, sin * along.x + cos * along.y)
     }
 
-    /// The way on the surface along which the picture's u grows by 1, from the ways along which the mesh's u and v do. Not finite
-    /// where the picture is stretched without end.
+    /// The way on the surface along which the picture's u grows by 1, from the ways along which the mesh's u and v do.
+    /// Not finite where the picture is stretched without end.
     pub(crate) fn along_picture(&self, along_u: Vec3, along_v: Vec3) -> Vec3 {
         let (sin, cos) = self.rotation.sin_cos();
         along_u * (cos / self.scale.x) + if sin == 0.0 { Vec3::ZERO } else { along_v * (sin / self.scale.y) }

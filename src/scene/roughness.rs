@@ -1,4 +1,4 @@
-//! How rough microfacet surfaces are.
+//! Tells how rough microfacet surfaces are, by numbers or textures. What their facets do is left to `bsdf`.
 
 use super::ScalarInput;
 
@@ -46,7 +46,7 @@ impl Roughness {
     /// Perfectly smooth.
     pub const SMOOTH: Self = Self::isotropic(ScalarInput::constant(0.0));
 
-    /// The same GGX roughness everywhere, perceptual, in [0, 1].
+    /// GGX roughness that is the same everywhere, perceptual, in [0, 1].
     pub const fn constant(roughness: f32) -> Self {
         Self::isotropic(ScalarInput::constant(roughness))
     }

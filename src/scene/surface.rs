@@ -1,4 +1,5 @@
-//! How surfaces scatter light, as scene files tell it: one variant a model of `crate::bsdf`.
+//! How surfaces scatter light, as scene files tell it: one variant a model of `crate::bsdf`. How they are
+//! sampled is left to these models.
 
 use super::{ColorInput, MetalRoughness, Roughness, ScalarInput};
 use glam::Vec3;
@@ -16,7 +17,7 @@ pub enum Surface {
     OrenNayar {
         /// Albedo of the grooves' walls in [0, 1].
         reflectance: ColorInput,
-        /// In [0, 1]; 0 is Lambert.
+        /// Roughness in [0, 1]; 0 is Lambert.
         roughness: ScalarInput,
     },
     /// A thin diffuse sheet: paper, leaves.
@@ -202,7 +203,8 @@ impl Surface {
         }
     }
 
-    /// Models that it takes at a point: 1, but for mixes and for volumes, whose boundary is one more and layers over it another.
+    /// Models that it takes at a point: 1, but for mixes and for volumes, whose boundary is one more and layers over it
+    /// another.
     pub fn components(&self) -> usize {
         match self {
             Self::Mix { first, second, .. } => first.components() + second.components(),
@@ -256,7 +258,7 @@ impl Surface {
         }
     }
 
-    /// Every colour that the model reads.
+    /// Colours that the model reads, every one.
     pub fn colors(&self) -> Vec<&ColorInput> {
         match self {
             Self::Diffuse { reflectance }
@@ -274,7 +276,7 @@ impl Surface {
         }
     }
 
-    /// Every scalar that the model reads.
+    /// Scalars that the model reads, every one.
     pub fn scalars(&self) -> Vec<&ScalarInput> {
         match self {
             Self::Diffuse { .. }

@@ -52,8 +52,8 @@ impl TextureLookup {
 }
 
 impl Texture {
-    /// Linear RGBA at coordinates of which (0, 0) is the upper left corner of the picture and (1, 1) the lower right one.
-    /// Bilinear between texel centres, or the nearest texel. Coordinates that are not finite read as (0, 0).
+    /// Linear RGBA at coordinates of which (0, 0) is the upper left corner of the picture and (1, 1) the lower right
+    /// one. Bilinear between texel centres, or the nearest texel. Coordinates that are not finite read as (0, 0).
     pub fn sample_rgba(&self, uv: Vec2) -> Vec4 {
         match &self.texels {
             Texels::Bytes(texels, Encoding::Linear) => self.sample_of(uv, |index| {
@@ -106,8 +106,8 @@ impl Texture {
         Blend { texels: [upper[0], upper[1], lower[0], lower[1]], fraction: Vec2::new(x - left as f32, y - top as f32) }
     }
 
-    /// The stored texels that [`Self::sample_rgba`] will read at these coordinates, to be fetched ahead; `None` for textures of
-    /// floats.
+    /// The stored texels that [`Self::sample_rgba`] will read at these coordinates, to be fetched ahead;
+    /// `None` for textures of floats.
     pub(crate) fn stored_at(&self, uv: Vec2) -> Option<[&[u8; 4]; 4]> {
         match &self.texels {
             Texels::Bytes(texels, _) => Some(self.blend(uv).texels.map(|index| &texels[index])),
@@ -126,8 +126,8 @@ impl Texture {
         }
     }
 
-    /// Mean linear colour: of all texels if they are floats, else of at most 256 × 256 places. For choosing lights, telling
-    /// pictures apart and what has no place for a picture, not for shading.
+    /// Mean linear colour: of all texels if they are floats, else of at most 256 × 256 places. For choosing lights,
+    /// telling pictures apart and what has no place for a picture, not for shading.
     pub fn mean_color(&self) -> Vec3 {
         if let Texels::Floats(texels) = &self.texels {
             let sum: glam::DVec3 = texels.iter().map(|t| Vec3::new(t[0], t[1], t[2]).as_dvec3()).sum();
@@ -153,7 +153,8 @@ struct Blend {
     fraction: Vec2,
 }
 
-/// The largest whole number that is not above a value of less than 2³¹: `f32::floor` is a call on machines without SSE4.1.
+/// The largest whole number that is not above a value of less than 2³¹: `f32::floor` is a call on machines without
+/// SSE4.1.
 fn floor(value: f32) -> i64 {
     let whole = value as i32;
     (whole - i32::from(whole as f32 > value)).into()

@@ -1,12 +1,12 @@
 //! Whether a denoised picture is as wrong as the loop thinks where no witness tells.
 //!
-//! What a place's own raw noise is too strong to show is inferred from the rest of the picture. Of the tiles where that is so, one in
-//! fifty is sampled again, twice as often as it was, and the picture is compared with these samples: the energy of the difference
-//! less that of their own noise is the picture's whole squared error, without bias, since no denoiser saw them. Its sum over the
-//! tiles, over what was predicted, goes for all that is unproven.
+//! What a place's own raw noise is too strong to show is inferred from the rest of the picture. Of the tiles where that
+//! is so, one in fifty is sampled again, twice as often as it was, and the picture is compared with these samples: the
+//! energy of the difference less that of their own noise is the picture's whole squared error, without bias, since no
+//! denoiser saw them. Its sum over the tiles, over what was predicted, goes for all that is unproven.
 //!
-//! A tile is looked at through a window that fades to nothing at its borders, for the eye's filters would see an edge there
-//! (Welch 1967).
+//! A tile is looked at through a window that fades to nothing at its borders, for the eye's filters would see
+//! an edge there (Welch 1967).
 //!
 //! In a shot both are by thresholds of noise that is new in every frame.
 
@@ -25,8 +25,8 @@ const TIMES: u32 = 2;
 /// A tile is a candidate if so much of it is unproven.
 const UNPROVEN_SHARE: f64 = 0.5;
 
-/// Audits what is unproven of a denoised picture at a target. `None` for raw pictures, where fewer than six tiles are unproven, and
-/// for pictures of fewer than 150 tiles, of which six would cost too much.
+/// Audits what is unproven of a denoised picture at a target. `None` for raw pictures, where fewer than six tiles are
+/// unproven, and for pictures of fewer than 150 tiles, of which six would cost too much.
 ///
 /// # Errors
 /// [`JudgeError::Outdated`] alone.
@@ -79,7 +79,8 @@ pub fn audit_unproven(
 /// What fresh samples say of a pixel, in scene units.
 struct Mean {
     luminance_cd_m2: f32,
-    /// Half the halves' difference: as strong as the mean's own noise; 0 where only one half has samples that are finite.
+    /// Half the halves' difference: as strong as the mean's own noise; 0 where only one half has samples that are
+    /// finite.
     noise_cd_m2: f32,
 }
 
@@ -102,7 +103,7 @@ fn window(place: usize) -> f32 {
 mod tests {
     use super::*;
 
-    /// It was taken for black, and the mean for half as light as it is.
+    /// Regression: such a half was taken for black, and the mean for half as light as it is.
     #[test]
     fn a_half_without_finite_samples_has_no_say() {
         let half = |light: f64, samples| HalfPixel { mean: [light; 3], samples, taken: 8, ..HalfPixel::default() };

@@ -1,4 +1,4 @@
-//! What the display makes of the noise of samples.
+//! What the display makes of the noise of samples. What the eye sees of it is left to the thresholds.
 
 use super::super::settings::LoopSettings;
 use super::super::statistics::{DifferenceOnDisplay, MOST_FACTOR, by_channel};
@@ -15,7 +15,7 @@ pub fn variance_share(film: &Film, pixel: usize) -> f64 {
     share_of_mean(Half::BOTH.map(|half| film.half(half)[pixel].samples))
 }
 
-/// The same of every pixel.
+/// Variance of each pixel's mean over that of one sample: [`variance_share`] of every pixel.
 pub fn variance_shares(film: &Film) -> Plane {
     film.plane(|pixel| variance_share(film, pixel) as f32)
 }
@@ -24,7 +24,7 @@ pub fn variance_shares(film: &Film) -> Plane {
 pub(super) struct NoiseOnDisplay<'a> {
     /// [`variance_shares`].
     pub(super) shares: &'a Plane,
-    /// Of the guide.
+    /// Scene colours of the guide.
     pub(super) colours: SceneColours<'a>,
     pub(super) tone: &'a dyn FittedTone,
     pub(super) settings: &'a LoopSettings,
@@ -33,8 +33,8 @@ pub(super) struct NoiseOnDisplay<'a> {
 }
 
 impl NoiseOnDisplay<'_> {
-    /// Displayed over scene variance by channel about a luminance, cd/m². `variance`: of one sample of a pixel by channel, in scene
-    /// units.
+    /// Displayed over scene variance by channel about a luminance, cd/m². `variance`: of one sample of a pixel
+    /// by channel, in scene units.
     pub(super) fn scales(
         &self,
         light: &Plane,
@@ -55,7 +55,8 @@ impl NoiseOnDisplay<'_> {
         self.settings.nits_per_unit * self.settings.nits_per_unit * self.inflation
     }
 
-    /// `of` the mean's variance in the scene and as displayed, (cd/m²)², of each pixel by channel. Arguments as of [`Self::scales`].
+    /// `of` the mean's variance in the scene and as displayed, (cd/m²)², of each pixel by channel. Arguments as of
+    /// [`Self::scales`].
     fn of_displayed(
         &self,
         light: &Plane,
@@ -81,8 +82,9 @@ fn planes_of(width: usize, pixels: usize, of: impl Fn(usize) -> [f32; CHANNELS] 
     by_channel(|c| Plane::from_fn(width, pixels / width.max(1), |x, y| found[y * width + x][c]))
 }
 
-/// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display
-/// makes of a pixel's own noise, before any pooling. From scene units. `rgb_cd_m2`: the picture whose luminance `light` is.
+/// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what
+/// the display makes of a pixel's own noise, before any pooling. From scene units. `rgb_cd_m2`: the picture
+/// whose luminance `light` is.
 pub fn display_scale(
     film: &Film,
     light: &SceneLight,
@@ -97,16 +99,16 @@ pub fn display_scale(
         .scales(luminance, |pixel| film.halves(pixel).sample_variances())
 }
 
-/// Most times of what scatter says that halves may differ by, where the operator knows the picture's colours: how noise of single channels
-/// goes together no variances tell. A red wall two stops over by `pbr-neutral`, asked for 1, ended at 1.56 with the others' most, at 1.47
-/// with 2 and at 1.23 with this.
+/// Most times of what scatter says that halves may differ by, where the operator knows the picture's colours: how noise
+/// of single channels goes together no variances tell. Measured of a red wall two stops over by `pbr-neutral`, asked
+/// for 1: it ends at 1.56 with the others' most, at 1.47 with 2 and at 1.23 with this.
 const MOST_FACTOR_OF_COLOURS: f32 = 4.0;
 
-/// What the halves differ by as displayed, by channel, and what independent samples about the guide's luminance would. `guide`: that,
-/// cd/m². `colours`: of the guide.
+/// What the halves differ by as displayed, by channel, and what independent samples about the guide's luminance would.
+/// `guide`: that, cd/m². `colours`: of the guide.
 ///
-/// Means of a half scatter by more than the picture's, whose noise this is to correct: above a clip they reach below it more often, so
-/// that what is taken off is rather too little.
+/// Means of a half scatter by more than the picture's, whose noise this is to correct: above a clip they reach below it
+/// more often, so that what is taken off is rather too little.
 pub(super) fn difference_on_display(
     film: &Film,
     guide: &Plane,

@@ -1,8 +1,10 @@
-//! A picture with alpha over white: what covers a pixel hides light there, and noise of how much it hides is noise of light.
+//! A picture with alpha over white: what covers a pixel hides light there, and noise of how much it hides is noise of
+//! light.
 //!
-//! Before black a dark object has no noise at its edges whatever its alpha is: a black ball out of focus was called invisible noise at 16 samples
-//! a pixel, and showed 4.1 times its threshold over white, or over grey, by which thresholds rise and fall as the noise does. To visibility 1 it takes 222, and
-//! shows 0.7 of it over any ground between.
+//! So a picture with alpha is judged over white as well: before black a dark object has no noise at its edges whatever
+//! its alpha is. Measured of a black ball out of focus: judged before black alone it is done at 16 samples a pixel, and
+//! shows 4.1 times its threshold over white, or over grey, by which thresholds rise and fall as the noise does. To
+//! visibility 1 over white it takes 222, and shows 0.7 of it over any ground between.
 
 use super::super::settings::LoopSettings;
 use super::steps::{Guide, Scatter, Thresholds, found_thresholds};
@@ -19,15 +21,16 @@ pub(super) struct OverWhite {
     visibility: Plane,
     /// Luminance variance of one sample, (cd/m²)²: pooled.
     pooled_per_sample: Plane,
-    /// And as each half decides by it; `None` where the look is for no plan.
+    /// Luminance variance of one sample, (cd/m²)², as each half decides by it; `None` where the look is for no plan.
     per_sample_of_halves: Option<[Plane; 2]>,
     /// Half of what the halves' coverage differs by, as light of the ground, cd/m².
     ground_half_difference: Plane,
 }
 
 impl OverWhite {
-    /// `guide_before_black`: the guide's luminance on the display, cd/m². `colour_scale`: displayed over scene variance of luminance; `None` where the
-    /// colours are denoised, and alpha alone is noisy.
+    /// What is seen of a film over white. `guide_before_black`: the guide's luminance on the display, cd/m².
+    /// `colour_scale`: displayed over scene variance of luminance; `None` where the colours are denoised, and alpha
+    /// alone is noisy.
     pub(super) fn of(
         film: &Film,
         guide: &Guide<'_>,
@@ -62,14 +65,15 @@ impl OverWhite {
         &self.visibility
     }
 
-    /// For variances of one sample that show before black, where thresholds are `own_allowed_cd_m2`, as much as the worse of one that is given
-    /// and that over white.
+    /// Takes, of variances of one sample that show before black, as much as the worse of the one that is given and that
+    /// over white. `own_allowed_cd_m2`: thresholds before black, cd/m².
     pub(super) fn worse_per_sample(&self, own_allowed_cd_m2: &Plane) -> WorsePerSample<'_> {
         let ratio = |own: f32, white: f32| (own / white) * (own / white);
         WorsePerSample { over_white: self, ratio: own_allowed_cd_m2.combined(&self.thresholds.limits(), ratio) }
     }
 
-    /// What the halves' difference shows, before black or over white. `displayed`: half the difference before black, cd/m².
+    /// What the halves' difference shows, before black or over white. `displayed`: half the difference before black,
+    /// cd/m².
     pub(super) fn worse_error(&self, own: MeasuredError, displayed: &Plane) -> MeasuredError {
         let over_white = displayed.combined(&self.ground_half_difference, |light, ground| light + ground);
         let white = self.thresholds.in_bands.measured_error(&over_white);
@@ -80,20 +84,21 @@ impl OverWhite {
     }
 }
 
-/// [`OverWhite::worse_per_sample`].
+/// What [`OverWhite::worse_per_sample`] compares.
 pub(super) struct WorsePerSample<'a> {
     over_white: &'a OverWhite,
-    /// Of squared thresholds, before black over white.
+    /// Ratio of squared thresholds, before black over white.
     ratio: Plane,
 }
 
 impl WorsePerSample<'_> {
-    /// Of a pooled variance.
+    /// The worse of a pooled variance of one sample before black and that over white, (cd/m²)² before black.
     pub(super) fn pooled(&self, own: &Plane) -> Plane {
         self.worse(own, &self.over_white.pooled_per_sample)
     }
 
-    /// Of what the halves decide by; `None` where the look was for no plan.
+    /// The worse of the variances that each half decides by and those over white, (cd/m²)² before black; `None` where
+    /// the look was for no plan.
     pub(super) fn of_halves(&self, [own_a, own_b]: [Plane; 2]) -> Option<[Plane; 2]> {
         let [white_a, white_b] = self.over_white.per_sample_of_halves.as_ref()?;
         Some([self.worse(&own_a, white_a), self.worse(&own_b, white_b)])

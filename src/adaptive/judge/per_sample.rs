@@ -1,4 +1,4 @@
-//! Variance of one sample, from which the counts of a plan are found.
+//! Variance of one sample, from which the counts of a plan are found. How many samples that makes is left to `plan`.
 
 use super::super::missed::FoundLight;
 use super::super::settings::LoopSettings;
@@ -11,7 +11,8 @@ use fechner_perception::Plane;
 use fechner_perception::threshold::ThresholdMap;
 use fechner_perception::tone::FittedTone;
 
-/// Luminance variance of one sample, (cd/m²)² on the display, that shows as much as the most visible of the eye's channels.
+/// Luminance variance of one sample, (cd/m²)² on the display, that shows as much as the most visible of the eye's
+/// channels.
 pub(super) struct PerSample {
     /// [`super::Judgement::met_per_sample`].
     pub(super) met: Plane,
@@ -36,7 +37,7 @@ pub(super) struct Sources<'a> {
 }
 
 impl PerSample {
-    /// Of a picture that stays raw: by what samples have met, and may have missed.
+    /// Variance of a picture that stays raw: by what samples have met, and may have missed.
     pub(super) fn of_raw(sources: &Sources<'_>, purpose: Purpose) -> Result<Self, JudgeError> {
         let &Sources { film, scatter, tone, settings, .. } = sources;
         let lights = sources.lights();
@@ -44,7 +45,8 @@ impl PerSample {
         Ok(met.or_missed(&lights, |light| scatter.missed_noise(film, light, tone, settings)))
     }
 
-    /// Of a picture that is denoised, in whose own error is what lamps' rims hide: by what samples have met.
+    /// Variance of a picture that is denoised, by what samples have met: what lamps' rims hide is in the
+    /// denoised picture's own error.
     pub(super) fn of_denoised(sources: &Sources<'_>, purpose: Purpose) -> Result<Self, JudgeError> {
         Self::met(sources, (purpose == Purpose::Plan).then(|| sources.lights()).as_ref())
     }
@@ -62,9 +64,10 @@ impl PerSample {
         Ok(Self { pooled: met.clone(), pooled_of_halves: None, met, of_halves })
     }
 
-    /// Or by what lamps' rims may hide, where that is more: of what a half decides by, beside the light that the other one has found; of the
-    /// whole, the mean of what each says. By the light of both a pixel that was lucky was called beyond white and done, and the others not: a
-    /// small lamp that moves made a picture 19 % too bright (`benches/results/energy.md`).
+    /// Raises these variances to what lamps' rims may hide, where that is more: of what a half decides by, beside the
+    /// light that the other one has found; of the whole, the mean of what each says. By the light of both, a pixel that
+    /// was lucky is taken to be beyond white and done, and the others are not. Measured by the light of both: a small
+    /// lamp that moves makes a picture 19 % too bright (`benches/results/energy.md`).
     fn or_missed(self, lights: &[FoundLight; 2], missed_beside: impl Fn(&FoundLight) -> Option<MissedNoise>) -> Self {
         let [Some(a), Some(b)] = lights.each_ref().map(missed_beside) else { return self };
         let of_halves = self.of_halves.map(|[of_a, of_b]| [b.or_scatter(&of_a), a.or_scatter(&of_b)]);
@@ -72,7 +75,7 @@ impl PerSample {
         Self { pooled: a.mean(&b).or_scatter(&self.met), pooled_of_halves, of_halves, ..self }
     }
 
-    /// Or by what shows over white, where that is more.
+    /// Raises these variances to what shows over white, where that is more.
     pub(super) fn or_over_white(self, over_white: Option<&OverWhite>, thresholds: &Thresholds) -> Self {
         let Some(over_white) = over_white else { return self };
         let worse = over_white.worse_per_sample(&thresholds.limits());

@@ -1,4 +1,5 @@
-//! The steps of a look, each of what was found before it: guide and tone, scatter, thresholds, and what chromatic noise shows.
+//! The steps of a look, each of what was found before it: guide and tone, scatter, thresholds, and what chromatic noise
+//! shows. Their order, and what becomes of the results, is left to `judge`.
 
 use super::super::denoised::TimedDenoising;
 use super::super::missed::{Darkness, EdgeProfile, FoundLight, LampEdges};
@@ -19,7 +20,8 @@ use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, Pixel, SceneLight, coloured};
 use std::borrow::Cow;
 
-/// The picture without its noise, from which the rest of a look is made: denoised for output where it is, else for this.
+/// The picture without its noise, from which the rest of a look is made: denoised for output where it is, else for
+/// this.
 pub(super) struct Guide<'a> {
     rgb_cd_m2: Cow<'a, [[f32; 3]]>,
     light: SceneLight,
@@ -44,12 +46,13 @@ impl<'a> Guide<'a> {
         self.light.luminance_cd_m2()
     }
 
-    /// Its luminance on the display, cd/m².
+    /// Luminance of the guide on the display, cd/m².
     pub(super) fn displayed(&self, tone: &dyn FittedTone, settings: &LoopSettings) -> Plane {
         seen::display_luminance(tone, &settings.viewing.display, self.luminance_cd_m2())
     }
 
-    /// The operator's fit, one that was made elsewhere, or to this; for luminance of this picture's colours, unless it is denoised.
+    /// The operator's fit, one that was made elsewhere, or to this; for luminance of this picture's colours, unless it
+    /// is denoised.
     pub(super) fn tone(&self, settings: &LoopSettings) -> Box<dyn FittedTone> {
         let fitted = match &settings.fitted {
             Some(fitted) => fitted.clone().restore(),
@@ -69,7 +72,8 @@ pub(super) struct Scatter {
     shares: Plane,
     /// [`seen::display_chromatic_slope`] of the guide.
     chromatic_slope: Plane,
-    /// Displayed over scene variance by channel, at the size that variances have now: [`super::display_scale`], with inflation.
+    /// Displayed over scene variance by channel, at the size that variances have now:
+    /// [`super::display_scale`], with inflation.
     scales: [Plane; CHANNELS],
     statistics: SampleStatistics,
 }
@@ -95,7 +99,7 @@ impl Scatter {
         Self { shares, chromatic_slope, scales, statistics }
     }
 
-    /// Of a film that holds what is displayed.
+    /// Scatter of a film that holds what is displayed.
     pub(super) fn of_display_light(film: &Film) -> Self {
         let scales = scene_units(film);
         let statistics = SampleStatistics::of(film, &scales);
@@ -108,7 +112,7 @@ impl Scatter {
         &self.scales
     }
 
-    /// The same of luminance.
+    /// Displayed over scene variance of luminance, per pixel.
     pub(super) fn luminance_scale(&self) -> &Plane {
         &self.scales[0]
     }
@@ -118,10 +122,11 @@ impl Scatter {
         per_sample.combined(&self.shares, |sample, share| sample * share)
     }
 
-    /// Displayed over scene variance by channel for what each half decides by: of the other half's light and noise. Where both halves' went
-    /// in, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
-    /// tube of light made a picture 2.75 % too bright (`benches/results/energy.md`). Of both are still which pixels shine, how
-    /// many samples there are, the guide's hues and what the operator leaves of tints on it, and what is seen over white. `lights`: of the halves.
+    /// Displayed over scene variance by channel for what each half decides by: of the other half's light and noise. By
+    /// both halves', pixels that were lucky go beyond white, show no noise and stop, and the others go on until they
+    /// are lucky, too. Measured by both: a thin tube of light makes a picture 2.75 % too bright
+    /// (`benches/results/energy.md`). Of both are still which pixels shine, how many samples there are, the guide's
+    /// hues and what the operator leaves of tints on it, and what is seen over white. `lights`: of the halves.
     pub(super) fn scales_of_halves(
         &self,
         film: &Film,
@@ -140,8 +145,8 @@ impl Scatter {
         })
     }
 
-    /// What lamps' rims, and known lamps that few samples met, may hide where so much light was found; `None` where no lamps are known, and the
-    /// pixel filter tells of no neighbour.
+    /// What lamps' rims, and known lamps that few samples met, may hide where so much light was found; `None` where no
+    /// lamps are known, and the pixel filter tells of no neighbour.
     pub(super) fn missed_noise(
         &self,
         film: &Film,
@@ -191,9 +196,10 @@ impl Scatter {
     }
 }
 
-/// Variances of one sample that show as much as light of lamps that is expected beside them, (cd/m²)² on the display. Pixels that
-/// lamps cover by a hundredth said that they had no variance, among neighbours that are unlike them: globes on black were called done at 5
-/// times the visibility that was asked for. No audit raises them, since no variance was found to be wrong.
+/// Variances of one sample that show as much as light of lamps that is expected beside them, (cd/m²)² on the display.
+/// Samples alone tell no variance of pixels that lamps cover by a hundredth, among neighbours that are unlike them, and
+/// no audit raises them, since no variance is found to be wrong. Measured without: globes on black are taken to be done
+/// at 5 times the visibility that is asked for.
 pub(super) struct MissedNoise(Plane);
 
 impl MissedNoise {
@@ -223,10 +229,10 @@ fn most_visible(
 /// What a picture hides, cd/m² on the display, without importance.
 #[derive(Debug)]
 pub struct Thresholds {
-    /// From the guide, by contrast sensitivity in bands.
+    /// Thresholds from the guide, by contrast sensitivity in bands.
     pub in_bands: ThresholdMap,
-    /// Standard error that a pixel may have at visibility 1 by the model that drives the loop, where that is another one: a rule of its
-    /// own for each pixel.
+    /// Standard error that a pixel may have at visibility 1 by the model that drives the loop, where that is another
+    /// one: a rule of its own for each pixel.
     pub per_pixel: Option<Plane>,
 }
 
@@ -248,8 +254,8 @@ impl Thresholds {
     }
 }
 
-/// [`super::Judgement::thresholds`]. `displayed_guide`: the guide's luminance on the display. `noise`: variance of the mean's, before
-/// denoising.
+/// [`super::Judgement::thresholds`]. `displayed_guide`: the guide's luminance on the display. `noise`: variance of the
+/// mean's, before denoising.
 pub(super) fn found_thresholds(
     guide: &Guide<'_>,
     displayed_guide: &Plane,
@@ -274,8 +280,8 @@ pub(super) fn found_thresholds(
     Ok(Thresholds { in_bands, per_pixel })
 }
 
-/// The thresholds of what stands still, where [`found_thresholds`] are of noise that is new in every frame: `None` of a still. Arguments as
-/// there.
+/// The thresholds of what stands still, where [`found_thresholds`] are of noise that is new in every frame: `None` of a
+/// still. Arguments as there.
 pub(super) fn thresholds_of_still(
     displayed_guide: &Plane,
     tone: &dyn FittedTone,
@@ -327,8 +333,8 @@ pub(super) fn chromatic_gains(
     })
 }
 
-/// Of the eye for noise that stands still, or that is new in every frame of such a timing. Noise goes through the loss of acuity that the
-/// operator shows, as the picture does.
+/// Sensitivity of the eye for noise that stands still, or that is new in every frame of such a timing. Noise goes
+/// through the loss of acuity that the operator shows, as the picture does.
 fn contrast_sensitivity(
     frames: Option<FrameTiming>,
     tone: &dyn FittedTone,

@@ -35,8 +35,9 @@ fn isoluminant_noise_is_seen_in_denoised_pictures() {
     assert!(seen.get(32, 32) > 10.0 * blind.get(32, 32), "{} and {}", seen.get(32, 32), blind.get(32, 32));
 }
 
-/// Beyond white every colour is white, and one sample in sixteen that brings thirty times as much changes nothing of what is shown. Without the
-/// halves' difference as displayed, visibility of the second was told as 15.4; it is as 2.2.
+/// Beyond white every colour is white, and one sample in sixteen that brings thirty times as much changes
+/// nothing of what is shown. Regression: without the halves' difference as displayed, visibility of the
+/// second came to 15.4; it is 2.2.
 #[test]
 fn noise_beyond_white_is_not_seen() {
     let red_for_green = Vec3::new(1.0, -0.2126 / 0.7152, 0.0);
@@ -49,8 +50,8 @@ fn noise_beyond_white_is_not_seen() {
     }
 }
 
-/// A wall far beyond white in red, and below it in green and blue: where each channel is clipped by itself, its noise is seen there. By
-/// greys of its luminance its visibility was told as 0, and the wall as white.
+/// A wall far beyond white in red, and below it in green and blue: where each channel is clipped by itself, its noise
+/// is seen there. Regression: by greys of its luminance its visibility came to 0, since such a wall would be white.
 #[test]
 fn noise_below_a_clipped_channel_is_seen() {
     let red = Vec3::new(20.0, 0.4, 0.2);
@@ -69,8 +70,8 @@ fn noisy(samples: [u32; 2]) -> Film {
     film_of_halves(samples, |_| false, |_, _, random| Vec3::splat(0.8 + 0.5 * random))
 }
 
-/// Whether a half was lucky and went beyond white is no matter to what it decides by, or it would stop because of its luck; the other half
-/// goes by it. On a lamp's rim, where light is expected, as elsewhere.
+/// Whether a half was lucky and went beyond white is no matter to what it decides by, or it would stop because of its
+/// luck; the other half goes by it. On a lamp's rim, where light is expected, as elsewhere.
 #[test]
 fn a_half_does_not_go_by_its_own_luck() {
     const RIM: u32 = 32 * 64 + 32;
@@ -133,8 +134,8 @@ fn a_clipped_lamp_does_not_trouble_its_neighbours() {
     assert!(after < 4.0 * before, "variance beside the lamp went from {before} to {after}");
 }
 
-/// A lamp's rim that none of sixteen samples has met leaves no scatter, and yet is not done: the pixel beside it says that a hundredth of
-/// the filter's light comes from the lamp.
+/// A lamp's rim that none of sixteen samples has met leaves no scatter, and yet is not done: the pixel beside it says
+/// that a hundredth of the filter's light comes from the lamp.
 #[test]
 fn a_rim_that_no_sample_met_is_seen() {
     let column = |pixel: u32| pixel % 64;
@@ -154,8 +155,8 @@ fn a_rim_that_no_sample_met_is_seen() {
     assert_eq!(judgement.pooled_variance_per_sample.get(40, 32), 0.0, "not where the filter does not reach");
 }
 
-/// One that a sample of one half has met is beyond white by its mean, and no better known for that: counts that ended there made a small
-/// lamp that moves 19 % too bright.
+/// One that a sample of one half has met is beyond white by its mean, and no better known for that: counts that ended
+/// there made a small lamp that moves 19 % too bright.
 #[test]
 fn a_rim_that_was_lucky_is_not_done() {
     let place = 21 * 64 + 33;
@@ -208,7 +209,8 @@ fn light_beyond_all_numbers_is_seen() {
     }
 }
 
-/// A black disc's border, half of whose samples meet nothing: before black there is nothing to see, and before white a lot.
+/// A black disc's border, half of whose samples meet nothing: before black there is nothing to see, and before white a
+/// lot.
 #[test]
 fn noise_of_alpha_is_seen_over_white() {
     let film = film_of_samples([64, 64], [8; 2], |pixel, half, index| {
@@ -235,8 +237,8 @@ fn noise_of_alpha_is_seen_over_white() {
     }
 }
 
-/// What a denoiser smears stays where it is from frame to frame: in a shot it is seen as well as in a still, where noise is seen less. What is left of
-/// that are blotches, which are hidden less than grain is: 0.88 of a still's.
+/// What a denoiser smears stays where it is from frame to frame: in a shot it is seen as well as in a still, where
+/// noise is seen less. What is left of that are blotches, which are hidden less than grain is: 0.88 of a still's.
 #[test]
 fn a_denoised_frame_has_the_bias_of_a_still() {
     let film = film_of(|pixel, random| Vec3::splat(0.5 + 0.3 * (pixel % 2) as f32 + 0.4 * random));

@@ -1,4 +1,5 @@
-//! How plans are made of blocks: what doubles a pixel, in which slices it is traced, and what fits a budget.
+//! How plans are made of blocks: what doubles a pixel, in which slices it is traced, and what fits a budget. Which
+//! pixels are to have samples is decided elsewhere.
 
 use crate::film::Film;
 use crate::integrator::{BlockWork, SamplePlan};
@@ -103,8 +104,8 @@ pub fn cut_to_budget(plan: SamplePlan, urgency: impl Fn(&BlockWork) -> f32, samp
     SamplePlan { blocks: kept.map(|(block, _)| block).collect() }
 }
 
-/// An urgency for [`cut_to_budget`] where nothing says who should have the last samples: chance does, not the order of the pixels, by
-/// which the top of the picture had them all.
+/// An urgency for [`cut_to_budget`] where nothing says who should have the last samples: chance does. By the order of
+/// the pixels the top of the picture would have them all.
 pub(in crate::adaptive) fn by_chance(film: &Film) -> impl Fn(&BlockWork) -> f32 {
     let taken = film.total_samples();
     move |block| (hash_words(taken, block.pixel.into()) >> 40) as f32

@@ -49,7 +49,8 @@ fn the_rest_of_a_doubling_follows_on() {
     }
 }
 
-/// A handful of pixels is doubled as often as what it shows asks for, a picture once, and none beyond what a pixel may have.
+/// A handful of pixels is doubled as often as what it shows asks for, a picture once, and none beyond what a pixel may
+/// have.
 #[test]
 fn handfuls_are_not_looked_at_after_each_doubling() {
     let mut film = Film::new(64, 64);
@@ -88,8 +89,8 @@ fn a_budget_leaves_no_gap_in_a_sequence() {
     assert_eq!(kept(19).len(), 4);
 }
 
-/// What is no multiple of the pixels is spread by chance, whatever single pixels had before: the last rows of stars had 16 samples a pixel where
-/// all others had 19.
+/// What is no multiple of the pixels is spread by chance, whatever single pixels had before. Regression: the last rows
+/// of stars had 16 samples a pixel where all others had 19.
 #[test]
 fn an_even_plan_leaves_no_rows_out() {
     const SIDE: u32 = 32;
@@ -130,9 +131,9 @@ fn a_uniform_plan_takes_exactly_what_is_asked() {
     }
 }
 
-/// The count rule on flat fields of 96×96 pixels whose standard error should become 1/32 of the samples' deviation: mean
-/// count over the right one (1024), pixels that stop below half of it, and energy lost. Gaussian noise, a lognormal of
-/// coefficient of variation 4, and fireflies that hold 10 % of the energy in one sample of 1000.
+/// The count rule on flat fields of 96×96 pixels whose standard error should become 1/32 of the samples' deviation:
+/// mean count over the right one (1024), pixels that stop below half of it, and energy lost. Gaussian noise, a
+/// lognormal of coefficient of variation 4, and fireflies that hold 10 % of the energy in one sample of 1000.
 #[test]
 fn counts_can_be_trusted_on_heavy_tails() {
     type Draw = fn(f64, f64) -> f64;

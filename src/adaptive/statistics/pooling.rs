@@ -70,8 +70,8 @@ const LANES: usize = 4;
 /// Columns of a [`Tile`].
 const TILE: usize = 32;
 
-/// Pools the neighbours of every pixel of a picture that is `width` wide, row-major. Each neighbour weighs the same whatever its
-/// count, so that a region's variance is not that of its hardest pixels.
+/// Pools the neighbours of every pixel of a picture that is `width` wide, row-major. Each neighbour weighs the same
+/// whatever its count, so that a region's variance is not that of its hardest pixels.
 ///
 /// `surfaces`: of each pixel.
 pub(super) fn pooled_by_neighbours(
@@ -119,7 +119,7 @@ const NOWHERE: f32 = 1e20;
 
 /// What pixels see first.
 pub(super) struct PixelSurfaces<'a> {
-    /// Of each pixel.
+    /// Guide of each pixel.
     pub(super) guides: &'a [PixelGuide],
     /// Small things of which few of these samples tell.
     pub(super) known_things: Option<&'a KnownThings>,
@@ -141,8 +141,9 @@ impl PixelSurfaces<'_> {
             // Never 0, so that a lone pixel still learns something.
             return AsNeighbour { looks, least_weight: 0.02 };
         }
-        // The noise of the sun's rim is not that of the sky around it: told of a thousandth of it, 144 pixels of sky had 18,626 samples where
-        // 16 are enough. Apart along another axis than the depth, where that is all that is left of a number.
+        // The noise of the sun's rim is not that of the sky around it. With a thousandth of it pooled in, 144 pixels
+        // of sky take 18,626 samples where 16 are enough. Apart along another axis than the depth, where that is all
+        // that is left of a number.
         looks[LOOKS] += APART;
         looks[DEPTH_LOOK] += libm::logf(share);
         AsNeighbour { looks, least_weight: 0.0 }
@@ -158,12 +159,12 @@ fn looks(guide: &PixelGuide) -> [f32; LOOK_FACTS] {
     [nx, ny, nz, red, green, blue, depth]
 }
 
-/// The facts of [`TILE`] pixels of a row, and of their neighbours in it, fact by fact. Of a size that the compiler knows: where it did
-/// not, half of the instructions of pooling asked whether they might read.
+/// The facts of [`TILE`] pixels of a row, and of their neighbours in it, fact by fact. Of a size that the compiler
+/// knows: where it did not, half of the instructions of pooling asked whether they might read.
 type Tile = [[f32; TILE + 2 * POOL_RADIUS]; FACTS];
 
-/// What is known of each pixel: its first surface, and what it says about variance. Around the picture lies a border, so that every
-/// pixel has a whole window of neighbours: these say and weigh nothing.
+/// What is known of each pixel: its first surface, and what it says about variance. Around the picture lies a border,
+/// so that every pixel has a whole window of neighbours: these say and weigh nothing.
 struct Facts {
     /// Tiles in a row.
     across: usize,
@@ -298,9 +299,10 @@ impl Sums {
 }
 
 impl ChannelSums {
-    /// Squared differences over their expectation, drawn towards 1 by one observation as heavy as the heaviest where that holds a sixth of all
-    /// or more, by less where none stands out: where a single pixel outweighs the others, its half difference may be small by luck. Drawn by
-    /// the whole of it everywhere, noise of an even wall, which stratification brings down to a fifth, was told 1.25 times too strong.
+    /// Squared differences over their expectation, drawn towards 1 by one observation as heavy as the heaviest where
+    /// that holds a sixth of all or more, by less where none stands out: where a single pixel outweighs the others, its
+    /// half difference may be small by luck. Not drawn by the whole of it everywhere: noise of an even wall, which
+    /// stratification brings down to a fifth, comes out 1.25 times too strong then.
     fn factor(&self, lane: usize) -> f32 {
         /// Share of the evidence from which on one observation outweighs the others.
         const HEAVY: f32 = 1.0 / 6.0;
@@ -418,8 +420,8 @@ mod tests {
         }
     }
 
-    /// Of 48 neighbours alike, whose halves differ by a fifth of what independent samples would, nearly a fifth; of one that outweighs the
-    /// others, half.
+    /// Of 48 neighbours alike, whose halves differ by a fifth of what independent samples would, nearly a fifth; of one
+    /// that outweighs the others, half.
     #[test]
     fn a_factor_is_drawn_towards_one_by_what_outweighs_the_others() {
         let factor = |squared: f32, expected: f32, most: f32| {

@@ -1,8 +1,8 @@
 //! Velocity of what mirrors and clear glass show.
 //!
-//! A camera ray is followed over mirrors and glass to what is seen there. In the other frame that point has moved, and so may have
-//! the mirrors: the pixel is looked for whose ray, over the same things, leads to it. Not for rough surfaces, whose image is a
-//! blur without a place: they keep their surface's motion.
+//! A camera ray is followed over mirrors and glass to what is seen there. In the other frame that point has moved, and
+//! so may have the mirrors: the pixel is looked for whose ray, over the same things, leads to it. Not for rough
+//! surfaces, whose image is a blur without a place: they keep their surface's motion.
 
 use super::{Seen, Target, VelocityMap, place_in, ray_through, seen_along, seen_at, target_in};
 use crate::geometry::Ray;
@@ -24,8 +24,8 @@ impl<'a> Moment<'a> {
 }
 
 impl VelocityMap {
-    /// As [`VelocityMap::new`], but where a pixel shows a perfectly smooth mirror or glass, of what is seen in it; where there is
-    /// no such place in the other frame, or none that can be found, of the surface.
+    /// Velocities as [`VelocityMap::new`] finds them, but where a pixel shows a perfectly smooth mirror or glass, of
+    /// what is seen in it; where there is no such place in the other frame, or none that can be found, of the surface.
     pub fn of_images(tracer: &PathTracer, previous: &PathTracer, next: &PathTracer) -> Self {
         let area = tracer.settings().film_area();
         let [before, now, after] = [previous, tracer, next].map(Moment::of);
@@ -65,7 +65,8 @@ impl Image {
         Self { path, seen, target, virtual_place }
     }
 
-    /// Where it would seem to be, if its surfaces were plane mirrors and panes at rest, once what is seen has come to `target`.
+    /// Where it would seem to be, if its surfaces were plane mirrors and panes at rest, once what is seen has come to
+    /// `target`.
     fn moved_virtual_place(&self, target: Target) -> Target {
         let shown = |motion: Vec3| Vec3::from(self.path.unfolded * Vec3A::from(motion));
         match (self.virtual_place, self.target, target) {
@@ -79,9 +80,10 @@ impl Image {
         }
     }
 
-    /// Its place in the picture of another moment. It is looked for from where the virtual place would be, which is it for plane
-    /// mirrors at rest, from where the surface has gone, and from where it was. Of a curved mirror's several images, one that lies
-    /// much further away than these, or than a plane mirror's would have moved, is not the one that was seen.
+    /// Its place in the picture of another moment. It is looked for from where the virtual place would be, which is
+    /// it for plane mirrors at rest, from where the surface has gone, and from where it was. Of a curved mirror's
+    /// several images, one that lies much further away than these, or than a plane mirror's would have moved, is
+    /// not the one that was seen.
     fn place_in(&self, other: &Moment, center: Vec2, of_surface: Option<Vec2>) -> Option<Vec2> {
         const NEAR_PX: f32 = 8.0;
         let target = target_in(other.tracer.world().scene(), &self.seen)?;
@@ -122,8 +124,8 @@ impl Search<'_> {
         self.miss(place_px).map(|miss| Aim { place_px, miss })
     }
 
-    /// By how much the last ray from a place misses the target, as a difference of unit directions; `None` where there is no such
-    /// ray, or the target is behind it.
+    /// By how much the last ray from a place misses the target, as a difference of unit directions; `None` where there
+    /// is no such ray, or the target is behind it.
     fn miss(&self, place: Vec2) -> Option<Vec3A> {
         let last = self.other.tracer.follow_again(ray_through(&self.other.camera, place), self.vertices)?;
         let wanted = match self.target {

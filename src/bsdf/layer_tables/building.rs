@@ -1,4 +1,5 @@
-//! How the tables of a coat over a metal are made: a lobe of one reflection, scaled until it brings out what the walk does.
+//! How the tables of a coat over a metal are made: a lobe of one reflection, scaled until it brings out what the walk
+//! does.
 
 use super::{COLUMNS, Cell, LayerPoint, SMALLEST_AVERAGE, cosine, inside, outside, place, seen_through};
 use crate::bsdf::albedo_table::{TablePlace, direction_at, visible_normals_and_weights};
@@ -11,7 +12,8 @@ use crate::bsdf::microfacets::Microfacets;
 use glam::Vec3;
 use std::f32::consts::FRAC_PI_2;
 
-/// Rounds of scaling. Each halves the error, which of what has entered is up to 6 % after the first and 0.5 % after four.
+/// Rounds of scaling. Each halves the error, which of what has entered is up to 6 % after the first and 0.5 % after
+/// four.
 const ROUNDS: usize = 4;
 
 /// A coat, and what of it does not depend on the metal.
@@ -88,7 +90,8 @@ impl<'a> CoatOver<'a> {
         cell
     }
 
-    /// Scales the lobe of one reflection until it brings out what the walk does. All that it leaves is put into `later`.
+    /// Scales the lobe of one reflection until it brings out what the walk does. All that it leaves is put into
+    /// `later`.
     fn scaled_lobe(&self, seen: Option<&Microfacets>, leaving: &LeavingByReflections) -> [LayerPoint; COLUMNS] {
         let mut points: [LayerPoint; COLUMNS] = std::array::from_fn(|column| {
             let behind_smooth = inside(direction_at(cosine(column)), self.coat.eta).z;
@@ -151,8 +154,8 @@ impl LayerPoint {
 }
 
 impl Cell {
-    /// 1/π times the integrals over the hemisphere of what enters and leaves after two reflections, or more, weighted by the
-    /// cosine; by the midpoint rule in √μ and in azimuth.
+    /// 1/π times the integrals over the hemisphere of what enters and leaves after two reflections, or more, weighted
+    /// by the cosine; by the midpoint rule in √μ and in azimuth.
     fn averages(&self, coat: &Coat<'_>) -> [f32; 2] {
         const AZIMUTH_STEPS: usize = 48;
         const COSINE_STEPS: usize = 128;

@@ -18,7 +18,8 @@ pub(super) enum Budget {
     NearlyLossless,
     /// No more than all.
     AtMost,
-    /// No more than all, but for the 4 % by which the Kirchhoff approximation of the source overshoots at grazing angles.
+    /// No more than all, but for the 4 % by which the Kirchhoff approximation of the source overshoots at grazing
+    /// angles.
     Kirchhoff,
 }
 
@@ -39,7 +40,7 @@ impl Case {
         Self { name: name.into(), bsdf, budget, eta: 1.0, width }
     }
 
-    /// (Index on the side of `wi` / index on the side of `wo`)²: turns radiance back into energy.
+    /// What turns radiance back into energy: (index on the side of `wi` / index on the side of `wo`)².
     pub(super) fn energy_per_radiance(&self, wo: Vec3, wi: Vec3) -> f64 {
         let index = |w: Vec3| f64::from(if w.z > 0.0 { 1.0 } else { self.eta });
         (index(wi) / index(wo)).powi(2)
@@ -259,8 +260,8 @@ fn gltf_cases(cases: &mut Vec<Case>) {
     }
 }
 
-/// Coats over a base whose normal is another. Not reciprocal by the cosines of the coat, and sampled in a frame of the base's, so that
-/// the last bits of a sample and an evaluation may differ.
+/// Coats over a base whose normal is another. Not reciprocal by the cosines of the coat, and sampled in a frame of the
+/// base's, so that the last bits of a sample and an evaluation may differ.
 pub(super) fn bumpy_cases() -> Vec<Case> {
     static FROSTED: LazyLock<Bsdf<'static>> = LazyLock::new(|| Bsdf::dielectric(1.5, 0.4, Vec3::ONE, Some(&*GLASS)));
     let white = MetalRoughness::new(&MetalRoughnessParameters::default());

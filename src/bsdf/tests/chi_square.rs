@@ -1,4 +1,4 @@
-//! Sampling matches the pdf, and the pdf integrates to 1 less what is discarded.
+//! Tests that sampling matches the pdf, and that the pdf integrates to 1 less what is discarded.
 
 use super::cases::{Case, bumpy_cases, delta_cases, smooth_cases, views};
 use super::sphere::{Bins, integrate};

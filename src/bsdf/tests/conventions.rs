@@ -1,4 +1,4 @@
-//! What the module promises about sides and about radiance across boundaries.
+//! Tests what the module promises about sides and about radiance across boundaries.
 
 use super::cases::{delta_cases, smooth_cases};
 use crate::bsdf::{Bsdf, BsdfSample, Lobe, Varnish, Varnished, turn};
@@ -82,7 +82,8 @@ fn what_goes_straight_on_is_what_samples_carry() {
     }
 }
 
-/// A coat's normal and its base's may put a direction on different sides: no path goes on through such a sheet, and no shadow ray may.
+/// A coat's normal and its base's may put a direction on different sides: no path goes on through such a
+/// sheet, and no shadow ray may.
 #[test]
 fn nothing_goes_straight_through_where_the_normals_of_coat_and_base_disagree() {
     let Bsdf::MetalRoughness(clear) = Bsdf::metal_roughness(Vec3::ONE, 0.0, 0.0, 1.5, 1.0) else { panic!("a sheet") };

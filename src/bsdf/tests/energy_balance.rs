@@ -1,4 +1,5 @@
-//! White furnaces: what a model gives back of uniform light from everywhere.
+//! White furnaces: what a model gives back of uniform light from everywhere. What is lost or made between two
+//! directions alone is not seen here.
 
 use super::cases::{Budget, Case, bumpy_cases, delta_cases, smooth_cases, views};
 use super::sphere::{Bins, integrate};

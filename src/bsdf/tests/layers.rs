@@ -44,7 +44,8 @@ fn mean_of(mut path: impl FnMut() -> Vec3) -> Vec3 {
 }
 
 /// Within 10 %, of which chance is 1 or 2 %: the angles at which light meets the metal are known by their mean alone,
-/// and rough coats spread them. By what the coat lets out as seen from outside it was up to 1.4 of the two layers.
+/// and rough coats spread them. Regression: by what the coat lets out as seen from outside it gave back up to 1.4
+/// times what the two layers do.
 #[test]
 fn a_coated_metal_gives_back_what_its_two_layers_do() {
     let mut random = Random::new(11);
@@ -77,8 +78,8 @@ fn brushed_tables(ior: f32, layers: [[f32; 2]; 2]) -> LayerTables {
     LayerTables::new(ior, [Distribution::Ggx; 2], widths)
 }
 
-/// A lossless metal gave back 0.44 to 1.10 of the light, since what one reflection brings out was taken from facets of the
-/// mean widths.
+/// Regression: a lossless metal gave back 0.44 to 1.10 of the light, since what one reflection brings out was taken
+/// from facets of the mean widths.
 #[test]
 fn brushed_layers_lose_and_make_no_light_along_any_azimuth() {
     let mut random = Random::new(12);

@@ -1,4 +1,4 @@
-//! Helmholtz reciprocity: f(A→B)/η_B² = f(B→A)/η_A².
+//! Tests Helmholtz reciprocity: f(A→B)/η_B² = f(B→A)/η_A².
 
 use super::cases::smooth_cases;
 use super::statistics::Random;

@@ -6,8 +6,8 @@ use std::f64::consts::{PI, TAU};
 /// Values integrated together.
 pub(super) type Values = [f64; 2];
 
-/// A part of the sphere between two polar angles and two azimuths. (Angles, not heights: a narrow peak at the pole would
-/// be squeezed into the last 1e-6 of the heights.)
+/// A part of the sphere between two polar angles and two azimuths. (Angles, not heights: a narrow peak at the pole
+/// would be squeezed into the last 1e-6 of the heights.)
 #[derive(Clone, Copy)]
 pub(super) struct Cell {
     pub(super) theta: [f64; 2],

@@ -1,4 +1,4 @@
-//! A contact sheet: the frames of a shot, small, in one picture.
+//! A contact sheet: the frames of a shot, small, in one picture. Of long shots only some frames are on it.
 
 use anyhow::Result;
 use fechner::output::write_png;
@@ -29,7 +29,7 @@ pub(super) struct ContactSheet {
 }
 
 impl ContactSheet {
-    /// For so many frames of a size; as many columns as rows.
+    /// A sheet for so many frames of a size in pixels; as many columns as rows.
     pub(super) fn new(count: usize, (frame_width, frame_height): (usize, usize)) -> Self {
         let columns = (1..).find(|columns| columns * columns >= count).unwrap_or(1);
         let tile_width = (SHEET_WIDTH / columns).min(frame_width).max(1);

@@ -1,4 +1,4 @@
-//! Numbers of frames and their rate, as the command line has them.
+//! Numbers of frames and their rate, as the command line has them. Which of them are there already is left to `shot`.
 
 use crate::cli::numbers::parse_positive;
 
@@ -41,7 +41,7 @@ pub(in crate::cli) fn parse_rate(text: &str) -> Result<f64, String> {
     parse_rate_from(1.0, text)
 }
 
-/// The same down to a frame in a thousand seconds, for time lapses that eyes adapt along.
+/// Reads a rate in frames a second, from one in a thousand seconds on: for time lapses that eyes adapt along.
 pub(in crate::cli) fn parse_lapse_rate(text: &str) -> Result<f64, String> {
     parse_rate_from(0.001, text)
 }

@@ -1,4 +1,4 @@
-//! Layers of motion in a frame's file.
+//! Adds layers of motion to a frame's file.
 
 use super::AovNames;
 use fechner::animate::velocity::VelocityMap;

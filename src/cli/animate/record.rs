@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 /// The figures of one frame, and which picture they are of.
 #[derive(Serialize, Deserialize)]
 pub(super) struct FrameRecord {
-    /// All that the picture depends on, as a name.
+    /// Everything that the picture depends on, as a name.
     pub(super) key: String,
     /// The picture's file, in the same folder.
     pub(super) picture: String,
-    /// Of all its bytes.
+    /// Hash of all bytes of the picture's file.
     pub(super) picture_hash: ContentHash,
     pub(super) frame: u32,
     pub(super) seconds_of_shot: f64,
@@ -61,7 +61,7 @@ pub(super) fn name(file: &Path) -> String {
     file.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Of all bytes of a file.
+/// Hash of all bytes of a file.
 pub(super) fn hash_of_file(file: &Path) -> Result<ContentHash> {
     let bytes = read_file::bytes(file).with_context(|| format!("{}", file.display()))?;
     Ok(ContentHash::of_bytes(&bytes))

@@ -35,7 +35,7 @@ use std::time::Duration;
 pub(in crate::cli) struct ShotFrame {
     pub(in crate::cli) scenes: FrameScenes,
     pub(in crate::cli) settings: LoopSettings,
-    /// All that its file depends on, as a name.
+    /// Everything that the frame's file depends on, as a name.
     pub(in crate::cli) key: String,
 }
 
@@ -117,7 +117,8 @@ impl<'a> Shot<'a> {
         Ok(())
     }
 
-    /// Says where frames of another call are there already that may be of the same shot: each call would fit the exposure to its own.
+    /// Says where frames of another call are there already that may be of the same shot: each call would fit the
+    /// exposure to its own.
     pub(super) fn note_other_frames(&self) {
         let Frames { first, last } = self.arguments.frames;
         let found = self.name.numbers().unwrap_or_default();
@@ -137,7 +138,7 @@ impl<'a> Shot<'a> {
         }
     }
 
-    /// For whose eyes a frame is that is judged by these settings, as its film says it.
+    /// The record of who a frame is for that is judged by these settings, as its film keeps it.
     pub(in crate::cli) fn settings_record(&self, of_frame: &LoopSettings) -> SettingsRecord {
         SettingsRecord {
             sampling: self.settings.sampling,
@@ -176,7 +177,7 @@ impl<'a> Shot<'a> {
         Ok(operator_named(&self.operator_name, &ToneSettings { exposure_stops, ..ToneSettings::default() })?)
     }
 
-    /// Those of the frames to render that are not there as this run would make them. Reads all their scenes.
+    /// Frames of the shot to render that are not there as this run would make them. Reads all their scenes.
     pub(super) fn missing_frames(&self, track: &Track) -> Result<Vec<u32>> {
         let mut missing = Vec::new();
         for frame in self.arguments.frame_numbers() {
@@ -313,9 +314,9 @@ fn named_folder(file: &Path) -> Option<&Path> {
 /// What came of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Made {
-    /// It was there.
+    /// The frame was there.
     Kept,
-    /// It was not.
+    /// The frame was not there, and was made.
     New,
     /// There was one of other settings or another scene.
     Anew,

@@ -1,4 +1,5 @@
-//! The scenes of a shot, read from a file at each time.
+//! The scenes of a shot, read from a file at each time. The last three are kept, since a frame shares its
+//! neighbours with the next.
 
 use super::AnimateArguments;
 use fechner::animate::SceneSource;

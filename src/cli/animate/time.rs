@@ -25,8 +25,8 @@ struct FrameNeed {
 }
 
 impl ShotClock {
-    /// Takes a budget that began with the track, for the frames that are not there yet; `None` where all are. Pilots say what they
-    /// need for the visibility that fits the time; uniform sampling needs the same of each.
+    /// Takes a budget that began with the track, for the frames that are not there yet; `None` where all are. Pilots
+    /// say what they need for the visibility that fits the time; uniform sampling needs the same of each.
     pub(super) fn new(shot: &Shot<'_>, track: &Track, started: Instant, budget: Duration) -> Result<Option<Self>> {
         let missing = shot.missing_frames(track)?;
         if missing.is_empty() {
@@ -74,7 +74,7 @@ fn part_of(needs: &[FrameNeed], frame: u32) -> f64 {
 /// How long frames have taken.
 #[derive(Debug)]
 pub(super) struct FrameTimes {
-    /// Of the frames to come: whether they have a record.
+    /// Whether each of the frames to come has a record.
     to_come: VecDeque<bool>,
     rendered: u32,
     seconds: f64,
@@ -83,8 +83,8 @@ pub(super) struct FrameTimes {
 }
 
 impl FrameTimes {
-    /// For frames of which it is known whether they have a record. Those will be kept, unless one before was out of date: whether
-    /// they are takes reading their scenes.
+    /// Times of frames of which it is known whether they have a record. Those that have will be kept, unless one before
+    /// was out of date: whether they are takes reading their scenes.
     pub(super) fn new(have_record: impl Iterator<Item = bool>) -> Self {
         Self { to_come: have_record.collect(), rendered: 0, seconds: 0.0, any_outdated: false }
     }
@@ -99,7 +99,7 @@ impl FrameTimes {
         self.any_outdated |= made == Made::Anew;
     }
 
-    /// For the frames to come.
+    /// Seconds that the frames to come are expected to take.
     pub(super) fn seconds_left(&self) -> f64 {
         let is_made = |has_record: &&bool| self.any_outdated || !**has_record;
         let count = self.to_come.iter().filter(is_made).count();

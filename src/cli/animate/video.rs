@@ -20,7 +20,7 @@ pub(super) enum VideoFormat {
 }
 
 impl VideoFormat {
-    /// By the file's ending; .mp4 only where there is an ffmpeg to write it.
+    /// Format of a video by its file's ending; .mp4 only where there is an ffmpeg to write it.
     pub(super) fn of(path: &Path) -> Result<Self> {
         if path.as_os_str().to_string_lossy().ends_with(['/', std::path::MAIN_SEPARATOR]) {
             bail!("{}: a video is a file, and this is a folder's name", path.display());
@@ -39,8 +39,8 @@ impl VideoFormat {
     }
 }
 
-/// Writes the frames' files as a video. `fitted` gives the tone operator of a frame, counted from 0, for files that hold
-/// the scene's light.
+/// Writes the frames' files as a video. `fitted` gives the tone operator of a frame, counted from 0, for files
+/// that hold the scene's light.
 pub(super) fn write(
     path: &Path,
     format: VideoFormat,
@@ -72,7 +72,8 @@ fn encode(
         .args(["-y", "-loglevel", "error", "-f", "yuv4mpegpipe", "-i", "-", "-c:v", "libx264", "-crf", "14"])
         .args(["-pix_fmt", "yuv420p", "-color_primaries", "bt709", "-color_trc", "bt709", "-colorspace", "bt709"])
         .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-f", "mp4"])
-        // It takes what begins with a dash or with letters and a colon for something else than a file, unless its folder is named.
+        // It takes what begins with a dash or with letters and a colon for something else than a file, unless its
+        // folder is named.
         .arg(std::path::absolute(file)?)
         .stdin(Stdio::piped())
         .spawn()
@@ -101,8 +102,8 @@ fn stream<W: Write>(
     Ok(())
 }
 
-/// A frame's file as sRGB bytes, R′G′B′ after R′G′B′; `fitted` makes its tone operator. Where the shot is for an HDR display,
-/// that display's white is white.
+/// A frame's file as sRGB bytes, R′G′B′ after R′G′B′; `fitted` makes its tone operator. Where the shot is for an HDR
+/// display, that display's white is white.
 pub(super) fn shown_rgb8(
     file: &Path,
     fitted: impl Fn() -> Box<dyn FittedTone>,

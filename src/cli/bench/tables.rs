@@ -1,4 +1,4 @@
-//! What `bench` prints: tables in Markdown, for documents.
+//! What `bench` prints: tables in Markdown, for documents. Files of results are written elsewhere.
 
 use fechner::benchmark::{
     AnimationRow, ArmSummary, Bound, Calibration, DenoisingResults, Need, Quality, RaceMean, Reached,

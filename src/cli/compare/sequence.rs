@@ -49,7 +49,7 @@ struct Sequences<'a> {
     map: Option<FrameName>,
     /// Number of the first frame.
     first: u32,
-    /// Of the first frame, and so of all.
+    /// Shape of the first frame, and so of all.
     shape: Shape,
     viewing: Viewing,
     showing: Showing,
@@ -152,8 +152,8 @@ fn check_frames_kept(
     check_kept(&read.collect::<Vec<_>>(), &written.collect::<Vec<_>>())
 }
 
-/// The operator as it shows a whole sequence, by some frames from all over it: fitted to them one below the other, with eyes
-/// that are adapted to each of them alike. `None` for frames that are ready for the display.
+/// The operator as it shows a whole sequence, by some frames from all over it: fitted to them one below the other, with
+/// eyes that are adapted to each of them alike. `None` for frames that are ready for the display.
 fn fit(
     operator: &dyn ToneOperator,
     name: &FrameName,

@@ -44,7 +44,7 @@ pub(super) enum JobOptions {
     Shot(Box<AnimateArguments>),
 }
 
-/// The same, with what all frames share.
+/// A job with what all its frames share.
 pub(super) enum Job<'a> {
     Still(&'a JobArguments),
     Shot(Box<TrackedShot<'a>>),
@@ -56,7 +56,7 @@ pub(super) struct TrackedShot<'a> {
     track: OnceCell<Track>,
 }
 
-/// Everything about one frame of a job.
+/// What one frame of a job is rendered from.
 pub(super) struct Frame<'a> {
     scene: Arc<Scene>,
     trace: TraceSettings,
@@ -113,7 +113,7 @@ impl JobOptions {
         Ok(())
     }
 
-    /// Of a farm that is there.
+    /// The options of a farm that is there.
     pub(super) fn of(farm: &Farm) -> Result<Self> {
         let manifest = farm.manifest();
         Self::parse(manifest.work, &manifest.arguments, &farm.pictures(), manifest.picture_format)
@@ -141,12 +141,13 @@ impl JobOptions {
 }
 
 impl Job<'_> {
-    /// Everything about a frame as it is now.
+    /// A frame as it is now, with everything that it is rendered from.
     pub(super) fn frame(&self, number: u32) -> Result<Frame<'_>> {
         self.frame_beside(number, None)
     }
 
-    /// The same. A part is shown as it was in a film of it that may be there: to find out how the whole is shown takes seconds.
+    /// The same. A part is shown as it was in a film of it that may be there: to find out how the whole is shown takes
+    /// seconds.
     fn frame_beside(&self, number: u32, film: Option<&Path>) -> Result<Frame<'_>> {
         match self {
             Self::Still(arguments) => {
@@ -255,8 +256,9 @@ impl Job<'_> {
 }
 
 impl TrackedShot<'_> {
-    /// How light the shot is: from the file beside the pictures, or made anew where that is not of this frame's scene. Other
-    /// frames are looked at when they are asked for: a process that merges one should not have to read the scenes of all.
+    /// How light the shot is: from the file beside the pictures, or made anew where that is not of this
+    /// frame's scene. Other frames are looked at when they are asked for: a process that merges one should not
+    /// have to read the scenes of all.
     fn track(&self, number: u32) -> Result<&Track> {
         match self.track.get() {
             Some(track) => Ok(track),
@@ -288,18 +290,18 @@ impl Frame<'_> {
         }
     }
 
-    /// Its entry in a manifest.
+    /// The frame's entry in a manifest.
     pub(super) fn entry(&self, frame: u32) -> FrameEntry {
         let origin = self.header.origin.clone();
         FrameEntry { frame, seed: self.trace.seed, origin, judged_by: self.judged_by }
     }
 
-    /// Its scene made ready.
+    /// A tracer for the frame's scene.
     pub(super) fn tracer(&self) -> PathTracer {
         PathTracer::new(Arc::clone(&self.scene), self.trace)
     }
 
-    /// By which its film is judged.
+    /// The settings by which the frame's film is judged.
     pub(super) fn settings(&self) -> &LoopSettings {
         match &self.kind {
             FrameKind::Still { settings, .. } => settings,

@@ -1,4 +1,5 @@
-//! `farm merge`: what is there into films, and what comes next.
+//! `farm merge`: adds what is there into films, and finds what comes next. Rounds that are too small for units are
+//! traced here.
 
 use super::job::Job;
 use super::unit::{KeepingArguments, Worker};

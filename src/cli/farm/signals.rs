@@ -1,4 +1,4 @@
-//! What signals ask of a unit.
+//! Turns signals into what they ask of a unit.
 
 use crate::cli::signals::listen;
 use anyhow::Result;
@@ -13,7 +13,8 @@ pub(super) struct Signals {
 }
 
 impl Signals {
-    /// From here on SIGINT, SIGTERM and SIGHUP end with a checkpoint, and one that comes seconds later at once; SIGUSR1 asks for a checkpoint.
+    /// Listens to signals from here on: SIGINT, SIGTERM and SIGHUP end with a checkpoint, and one that comes seconds
+    /// later at once; SIGUSR1 asks for a checkpoint.
     pub(super) fn listen() -> Result<Self> {
         let leave = listen(|| {})?;
         let keep = Arc::new(AtomicBool::new(false));

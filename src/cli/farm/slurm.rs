@@ -1,4 +1,4 @@
-//! `farm slurm`: the farm as Slurm jobs.
+//! `farm slurm`: submits the farm as Slurm jobs. What these do is in the scripts beside it.
 
 use super::absolute;
 use crate::cli::numbers::whole;
@@ -43,7 +43,8 @@ fn parse_memory(text: &str) -> Result<String, String> {
     }
 }
 
-/// A time as sbatch reads it: minutes, minutes:seconds or hours:minutes:seconds; days- before hours, hours:minutes or all three.
+/// A time as sbatch reads it: minutes, minutes:seconds or hours:minutes:seconds; days- before hours,
+/// hours:minutes or all three.
 fn parse_time(text: &str) -> Result<String, String> {
     let (days, clock) = text.split_once('-').map_or((None, text), |(days, clock)| (Some(days), clock));
     let is_clock = clock.split(':').count() <= 3 && clock.split(':').all(is_whole);

@@ -1,4 +1,4 @@
-//! `farm status`: how far everything is, for people and schedulers.
+//! `farm status`: how far everything is, for people and schedulers. It changes nothing.
 
 use super::absolute;
 use crate::cli::words::{count, samples_in_words};
@@ -43,7 +43,7 @@ struct FrameStatus {
     samples: u64,
     /// Numbers of those that are missing.
     missing: Vec<u64>,
-    /// Of these, how many a process has now.
+    /// Number of missing units that a process has now.
     running: usize,
     /// Whether its picture is there: that of a frame that is done may have been lost.
     has_picture: bool,

@@ -1,4 +1,4 @@
-//! `farm unit`: executes orders.
+//! `farm unit`: executes orders, and decides nothing.
 
 use super::job::{Job, JobOptions};
 use super::signals::Signals;
@@ -102,7 +102,7 @@ fn plans_of_finished(farm: &Farm, frame_index: usize) -> Option<u32> {
 }
 
 impl<'a> Worker<'a> {
-    /// Does work of the farm in a folder, in a pool of so many threads.
+    /// Calls `work` with a worker of the farm in a folder, in a pool of so many threads.
     pub(super) fn with(
         folder: &Path,
         keeping: &KeepingArguments,

@@ -1,4 +1,4 @@
-//! `farm work`: one of any number of processes on a folder.
+//! `farm work`: one of any number of processes on a folder, which samples, merges and concludes as there is need.
 
 use super::merge::{MergeWent, conclude, merge};
 use super::unit::{IfBusy, KeepingArguments, Went, Worker};

@@ -1,4 +1,4 @@
-//! What a film's file holds, in words.
+//! Tells what a film's file holds, in words.
 
 use super::super::console::duration_in_words;
 use super::super::report::sampling_name;

@@ -1,4 +1,4 @@
-//! Sizes, crops and choices by name, as they are typed.
+//! Sizes, crops and choices by name, as they are typed. What goes together is left to `rules`.
 
 use anyhow::bail;
 use clap::ValueEnum;

@@ -1,4 +1,4 @@
-//! Whether a picture fits into memory.
+//! Refuses a picture that does not fit into memory. What a scene takes is not counted.
 
 use super::choices::Size;
 use crate::cli::system_memory::available_bytes;
@@ -7,7 +7,8 @@ use fechner::film::Film;
 
 /// Refuses a size whose film and maps would not fit into memory.
 pub(in crate::cli) fn check_memory(size: Size) -> anyhow::Result<()> {
-    /// Peak memory was 508 bytes a pixel at 256×256, program included (`peak_memory_bytes` of --json); the rest is margin.
+    /// Bytes of memory that a pixel is taken to need: 508 at 256×256, program included, by `peak_memory_bytes` of
+    /// --json; the rest is margin.
     const BYTES_PER_PIXEL: u64 = 700;
     let Size { width, height } = size;
     let pixels = u64::from(width) * u64::from(height);

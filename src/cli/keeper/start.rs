@@ -38,7 +38,7 @@ pub(in crate::cli) struct CheckpointArguments {
 pub(in crate::cli) struct Start {
     pub(in crate::cli) header: Header,
     pub(in crate::cli) state: RenderState,
-    /// Of the film as it is, before anything is added to it.
+    /// Seeds of the film as it is, before anything is added to it.
     pub(in crate::cli) seeds: SeedsSoFar,
 }
 
@@ -51,7 +51,7 @@ pub(in crate::cli) struct SeedsSoFar {
 }
 
 impl SeedsSoFar {
-    /// Of a render that begins with nothing.
+    /// Seeds of a render that begins with nothing.
     pub(in crate::cli) fn of_one(seed: u64) -> Self {
         Self { before: Seeds::one(seed), rays_before: 0, own: Seeds::one(seed) }
     }
@@ -73,8 +73,8 @@ impl CheckpointArguments {
         self.checkpoint.is_some()
     }
 
-    /// Finds out whether the file can be written before the work is done, and refuses to write over the work of others, done or under
-    /// way. The claim lasts as long as the file is written.
+    /// Finds out whether the file can be written before the work is done, and refuses to write over the work of others,
+    /// done or under way. The claim lasts as long as the file is written.
     pub(in crate::cli) fn claim(&self) -> anyhow::Result<Option<Claim>> {
         let Some(path) = &self.checkpoint else { return Ok(None) };
         output::check_writable(path)?;
@@ -88,8 +88,8 @@ impl CheckpointArguments {
         Ok(Some(claim))
     }
 
-    /// How the operator was fitted to the whole in the film that a render of this origin goes on from, seen as this one is: finding it anew takes
-    /// seconds.
+    /// How the operator was fitted to the whole in the film that a render of this origin goes on from, seen as this one
+    /// is: finding it anew takes seconds.
     pub(in crate::cli) fn kept_fit(&self, origin: &Origin, record: &SettingsRecord) -> Option<SavedTone> {
         let path = self.checkpoint.as_ref().filter(|_| self.resume)?;
         fit_in(path, origin, record)
@@ -138,8 +138,8 @@ impl CheckpointArguments {
     }
 }
 
-/// What keeps a film whose samples were spread by one rule from going on by another: its counts stay, and would be called the other's. By
-/// sight any film goes on.
+/// What keeps a film whose samples were spread by one rule from going on by another: its counts stay, and would be
+/// called the other's. By sight any film goes on.
 fn spread_otherwise(found: Sampling, asked: Sampling, film: &Film) -> Option<String> {
     let [its, this] = [found, asked].map(sampling_name);
     let counts = (0..film.pixel_count()).map(|pixel| film.samples(pixel));
@@ -152,7 +152,8 @@ fn spread_otherwise(found: Sampling, asked: Sampling, film: &Film) -> Option<Str
     })
 }
 
-/// How the operator is fitted in a film of this origin that is seen as `record` says. What is wrong with the file is for others to say.
+/// How the operator is fitted in a film of this origin that is seen as `record` says. What is wrong with the
+/// file is for others to say.
 pub(in crate::cli) fn fit_in(film: &Path, origin: &Origin, record: &SettingsRecord) -> Option<SavedTone> {
     let found = read_header(film).ok()?;
     let of_same = SettingsRecord { fitted: None, ..found.settings.clone() };

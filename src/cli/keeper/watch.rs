@@ -1,4 +1,4 @@
-//! All that watch a render from the command line, as one monitor.
+//! Lets all that watch a render from the command line be one monitor.
 
 use super::Keeper;
 use crate::cli::console::Console;
@@ -23,7 +23,7 @@ pub(in crate::cli) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// `stop`: what signals set, of [`crate::cli::signals::listen`].
+    /// A watch over one render. `stop`: what signals set, of [`crate::cli::signals::listen`].
     pub(in crate::cli) fn new(
         stop: Arc<AtomicBool>,
         console: Console,

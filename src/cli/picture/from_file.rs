@@ -1,4 +1,5 @@
-//! Reading them: what a file's bytes, channels and header say of its values.
+//! Reads pictures for the commands: what a file's bytes, channels and header say of its values. How they are
+//! shown is left to [`super`].
 
 use super::{Codes, Content, InputPicture};
 use crate::cli::channels::{self, Colour};
@@ -54,7 +55,7 @@ impl InputPicture {
         Self::read_in(Source::single(path), Unit::OfLight(nits_per_unit))
     }
 
-    /// The same of one of many frames, of all of which a note is said once.
+    /// Reads one of many frames as [`Self::read`] does; a note about all of them is said once.
     pub(in crate::cli) fn read_frame(path: &Path, nits_per_unit: Option<f64>) -> Result<Self> {
         Self::read_in(Source::frame(path), Unit::OfLight(nits_per_unit))
     }
@@ -274,8 +275,8 @@ fn picture_channel<'a>(exr: &'a ExrImage, name: &str) -> Option<&'a [f32]> {
     }
 }
 
-/// Luminance of RGB (1, 1, 1) as the file says it, where it is one that a picture can have: `whiteLuminance` is written by many and read
-/// by few.
+/// Luminance of RGB (1, 1, 1) as the file says it, where it is one that a picture can have: `whiteLuminance` is
+/// written by many and read by few.
 fn unit_in_file(source: Source<'_>, exr: &ExrImage) -> Option<f64> {
     let said = [NITS_PER_UNIT, "whiteLuminance"].into_iter().find_map(|name| match exr.attribute(name) {
         Some(Attribute::Float(nits)) => Some((name, *nits)),
@@ -312,7 +313,7 @@ impl<'a> Source<'a> {
         Self { path, kind: SourceKind::Single }
     }
 
-    /// One of many, of all of which a note is said once.
+    /// The source of one of many frames; a note about all of them is said once.
     pub(in crate::cli) fn frame(path: &'a Path) -> Self {
         Self { path, kind: SourceKind::Frame }
     }

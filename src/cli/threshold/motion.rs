@@ -1,4 +1,4 @@
-//! How what a picture shows moves, by the channels of a file.
+//! Finds how what a picture shows moves, by the channels of a file.
 
 use crate::cli::channels;
 use crate::cli::picture::InputPicture;

@@ -1,4 +1,4 @@
-//! Names of what is written and numbers of what is read.
+//! Names what `tonemap` writes and numbers what it reads.
 
 use super::TonemapArguments;
 use crate::cli::targets::{check_kept, display_file};
@@ -45,8 +45,8 @@ pub(super) fn frames_since_last(numbers: Option<Vec<i64>>, count: usize) -> Vec<
     std::iter::once(1).chain(steps).collect()
 }
 
-/// The numbers by which the files' names differ, before what follows the last dot: of those of which all names have different ones the
-/// last that ascend as the files are given, else the last; `None` where there are none.
+/// The numbers by which the files' names differ, before what follows the last dot: of those of which all names have
+/// different ones the last that ascend as the files are given, else the last; `None` where there are none.
 pub(super) fn frame_numbers(files: &[PathBuf]) -> Option<Vec<i64>> {
     let all: Vec<Vec<Option<i64>>> =
         files.iter().map(|file| Some(numbers_from_end(file.file_stem()?.to_str()?))).collect::<Option<_>>()?;
@@ -61,8 +61,8 @@ pub(super) fn frame_numbers(files: &[PathBuf]) -> Option<Vec<i64>> {
     different.into_iter().find(|numbers| numbers.is_sorted()).or(last)
 }
 
-/// All runs of digits in a name as numbers, the last first; `None` for those that are too long for one. Below 0 are those with a minus
-/// that stands at the name's start, or after a dot or an underscore: between words it is a hyphen.
+/// All runs of digits in a name as numbers, the last first; `None` for those that are too long for one. Below 0 are
+/// those with a minus that stands at the name's start, or after a dot or an underscore: between words it is a hyphen.
 fn numbers_from_end(stem: &str) -> Vec<Option<i64>> {
     let (mut numbers, mut left) = (Vec::new(), stem);
     while let Some(last) = left.rfind(|c: char| c.is_ascii_digit()) {

@@ -1,4 +1,4 @@
-//! A mapped picture as a file.
+//! Writes a mapped picture as a file. How it is mapped is left to [`super`].
 
 use super::SceneFrame;
 use crate::cli::kept_tone::{LIGHT, OF_DISPLAY};
@@ -21,7 +21,8 @@ pub(super) fn write(
     }
 }
 
-/// With straight alpha where it does not cover all, as a render of a transparent background; light that covers nothing raises it.
+/// With straight alpha where it does not cover all, as a render of a transparent background; light that
+/// covers nothing raises it.
 fn write_png(target: &Path, frame: &SceneFrame, fitted: &dyn FittedTone) -> Result<()> {
     let (rgb, alpha) = match frame.covered(fitted) {
         Some(covered) => {

@@ -1,6 +1,7 @@
 //! Weighted fits of planes through a pixel's neighbours, tile by tile, eight pixels at once.
 //!
-//! Loops, not closures: what a tile's work calls must be inlined to be compiled for wide vectors (see [`with_vectors`]).
+//! Loops, not closures: what a tile's work calls must be inlined to be compiled for wide vectors (see
+//! [`with_vectors`]).
 
 use super::lanes::{LANES, Lanes};
 use super::likeness::{Likeness, Scratch, TileWeights};
@@ -12,11 +13,13 @@ use rayon::prelude::*;
 /// Albedo, normal, depth.
 pub(super) const FEATURES: usize = 7;
 const _: () = assert!(TILE.is_multiple_of(LANES), "a tile's rows are whole groups");
-/// Neighbours that a fit by features takes at once: its 60 sums do not fit into registers, and are read and written once for all of these.
+/// Neighbours that a fit by features takes at once: its 60 sums do not fit into registers, and are read and
+/// written once for all of these.
 const AT_ONCE: usize = 4;
 /// Neighbours of less weight are passed over.
 const LEAST_WEIGHT: f32 = 1e-4;
-/// Variance of a sample's feature, about: what a fit follows may be the features' own noise, which is this over the samples.
+/// Variance of a sample's feature, about: what a fit follows may be the features' own noise, which is this over the
+/// samples.
 const FEATURE_VARIANCE: f64 = 0.004;
 /// What keeps a fit by place level where all neighbours that count lie in one line, square pixels.
 const PLACE_RIDGE: f32 = 0.58;
@@ -27,8 +30,8 @@ pub(super) struct Fitted {
     pub(super) variance: Vec<f32>,
 }
 
-/// Each pixel's colour by a plane through its neighbours' features, each the mean of so many samples, and the variance of a mean with
-/// the same weights.
+/// Fits each pixel's colour by a plane through its neighbours' features, each the mean of so many samples, and the
+/// variance of a mean with the same weights.
 pub(super) fn by_features<const PATCH: usize>(
     colours: &[PaddedPlane; 3],
     features: &[PaddedPlane; FEATURES],
@@ -43,7 +46,7 @@ pub(super) fn by_features<const PATCH: usize>(
     }
 }
 
-/// Each pixel's colour by a plane through its neighbours' places: a mean would make steps of what changes slowly.
+/// Fits each pixel's colour by a plane through its neighbours' places: a mean would make steps of what changes slowly.
 pub(super) fn by_place<const PATCH: usize>(
     colours: &[PaddedPlane; 3],
     likeness: &Likeness<'_, PATCH>,
@@ -65,7 +68,7 @@ impl Place {
     }
 }
 
-/// Of a plane, from a place on.
+/// Values of a plane, from a place on.
 #[inline(always)]
 fn at_place(plane: &PaddedPlane, place: Place) -> Lanes {
     Lanes(*plane.row(place.y, place.x))
@@ -191,7 +194,7 @@ struct TileWork<'a, F, const N: usize, const PATCH: usize> {
     x: usize,
     /// The values of the tile's rows, from the picture's left to its right.
     rows: &'a mut [[f32; N]],
-    /// Of the picture.
+    /// Width of the picture.
     width: usize,
 }
 
@@ -277,8 +280,9 @@ impl<const UNKNOWNS: usize> Equations<UNKNOWNS> {
         }
     }
 
-    /// The constant, by elimination: what the fit says of the pixel itself, not below 0. That one is among its neighbours with full
-    /// weight, so the last pivot is 1 at least. `ridge` is added to each other term's square, per weight.
+    /// The constant, by elimination: what the fit says of the pixel itself, not below 0. That one is among
+    /// its neighbours with full weight, so the last pivot is 1 at least. `ridge` is added to each other
+    /// term's square, per weight.
     #[inline(always)]
     fn value_at_center(mut self, ridge: f32) -> [Lanes; 3] {
         let last = UNKNOWNS - 1;

@@ -1,6 +1,6 @@
 //! Eight pixels at once, in arrays and loops that are compiled for wide vectors where they are inlined.
 
-/// So many.
+/// How many numbers are worked on at once.
 pub(super) const LANES: usize = 8;
 
 /// A value for each of the pixels that are worked on at once.
@@ -11,7 +11,7 @@ impl Lanes {
     pub(super) const ZERO: Self = Self([0.0; LANES]);
     pub(super) const ONE: Self = Self([1.0; LANES]);
 
-    /// Of a row, from a column on.
+    /// Numbers of a row, from a column on.
     #[inline(always)]
     pub(super) fn of<const WIDTH: usize>(row: &[f32; WIDTH], column: usize) -> Self {
         let mut found = Self::ZERO;
@@ -64,7 +64,7 @@ impl Lanes {
         self
     }
 
-    /// Each at least this.
+    /// These numbers, each raised to at least this.
     #[inline(always)]
     pub(super) fn at_least(mut self, least: f32) -> Self {
         for i in 0..LANES {

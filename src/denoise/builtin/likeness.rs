@@ -106,8 +106,8 @@ pub(super) struct Likeness<'a, const PATCH: usize> {
     pub(super) surfaces: &'a Surfaces,
     /// Standard errors of the difference at which a neighbour gets 1/e of the weight.
     pub(super) tolerance: f32,
-    /// A neighbour's variance counts as at most so many times the pixel's own: what is as bright as a lamp's reflection has the
-    /// variance to be anything, and would be taken for what is around it.
+    /// A neighbour's variance counts as at most so many times the pixel's own: what is as bright as a lamp's reflection
+    /// has the variance to be anything, and would be taken for what is around it.
     pub(super) most_variance_ratio: f32,
 }
 
@@ -116,20 +116,21 @@ pub(super) type TileWeights = [[f32; TILE]; TILE];
 /// Room for what is found of one tap on the way to its weights.
 #[derive(Default)]
 pub(super) struct Scratch {
-    /// Of each pixel of the tile and around it.
+    /// Unlikeness of each pixel of the tile and around it.
     unlike: [[f32; WIDEST]; TILE + 2 * MOST_PATCH],
     along: [[f32; TILE]; TILE + 2 * MOST_PATCH],
 }
 
 /// The most pixels to each side that are compared.
 const MOST_PATCH: usize = 2;
-/// As wide as a tile's neighbourhoods are and more, in whole vectors.
+/// Widest row of a tile's neighbourhoods: as wide as they are and more, in whole vectors.
 pub(super) const WIDEST: usize = TILE + 8;
 
 impl<const PATCH: usize> Likeness<'_, PATCH> {
     const FITS: () = assert!(PATCH <= MOST_PATCH, "a patch is wider than there is room for");
 
-    /// Weights of a tap for the pixels of the tile whose first pixel this is. Inlined, as all that it calls, for wide vectors.
+    /// Weights of a tap for the pixels of the tile whose first pixel this is. Inlined, as all that it calls, for wide
+    /// vectors.
     #[inline(always)]
     pub(super) fn weigh(&self, y: isize, x: isize, tap: Tap, scratch: &mut Scratch, weights: &mut TileWeights) {
         let () = Self::FITS;
@@ -156,8 +157,8 @@ impl<const PATCH: usize> Likeness<'_, PATCH> {
         }
     }
 
-    /// How the pixels around differ from those around the neighbour, squared, less what noise makes of it on average, in units of the
-    /// tolerance: summed along rows.
+    /// How the pixels around differ from those around the neighbour, squared, less what noise makes of it on average,
+    /// in units of the tolerance: summed along rows.
     #[inline(always)]
     fn unlike_surroundings(&self, y: isize, x: isize, tap: Tap, scratch: &mut Scratch) {
         let patch = PATCH as isize;
@@ -173,7 +174,8 @@ impl<const PATCH: usize> Likeness<'_, PATCH> {
                 let difference = own[i] - other[i];
                 let a = own_variance[i];
                 let b = lesser(other_variance[i], self.most_variance_ratio * a);
-                // Of a neighbour that is noisier than the pixel no more is taken off than the pixel's own: Rousselle et al. 2012, eq. 3.
+                // Of a neighbour that is noisier than the pixel no more is taken off than the pixel's own:
+                // Rousselle et al. 2012, eq. 3.
                 unlike[i] = (difference * difference - (a + lesser(a, b))) / (squared_tolerance * (a + b));
             }
         }

@@ -1,12 +1,14 @@
 //! Our own denoiser: what is alike is fitted, twice, by what the first surfaces say and by the pixels themselves.
 //!
-//! First, each pixel is fitted from the neighbours whose surroundings look like its own (non-local means, Buades, Coll and Morel
-//! 2005, with the distance of Rousselle, Knaus and Zwicker 2012, which knows the noise): a plane through albedo, normal and depth
-//! (first-order regression: Moon, Carr and Yoon 2014; Bitterli et al. 2016), so that textures and edges survive, whatever
-//! light makes of them. Then the light that falls on the surfaces is fitted again, farther out, by a plane through the place, by what the
-//! first pass left of the noise. Fireflies need no treatment of their own: their variance says that they may as well be their neighbours.
+//! First, each pixel is fitted from the neighbours whose surroundings look like its own (non-local means, Buades, Coll
+//! and Morel 2005, with the distance of Rousselle, Knaus and Zwicker 2012, which knows the noise): a plane through
+//! albedo, normal and depth (first-order regression: Moon, Carr and Yoon 2014; Bitterli et al. 2016), so that textures
+//! and edges survive, whatever light makes of them. Then the light that falls on the surfaces is fitted again, farther
+//! out, by a plane through the place, by what the first pass left of the noise. Fireflies need no treatment of their
+//! own: their variance says that they may as well be their neighbours.
 //!
-//! Not for a picture without surfaces: glass and mirrors are filtered by what the first surface says, and by what they show.
+//! Not for a picture without surfaces: glass and mirrors are filtered by what the first surface says, and by what they
+//! show.
 
 mod fit;
 mod lanes;
@@ -28,10 +30,11 @@ use taps::Taps;
 const MOST: f32 = 1e9;
 /// Share of its neighbours' variance that a pixel has at least: few samples may all be alike by chance.
 const SHARED_VARIANCE: f32 = 0.5;
-/// What is left of the noise after the first pass is alike from pixel to pixel: it counts as so many times its variance.
+/// What is left of the noise after the first pass is alike from pixel to pixel: it counts as so many times its
+/// variance.
 const CORRELATION: f32 = 2.0;
-/// What shines brighter than this, in units of [`unit_of`], is left as it came: its light has no noise but at its edges, and what
-/// those are neither half would know if both were smoothed alike.
+/// What shines brighter than this, in units of [`unit_of`], is left as it came: its light has no noise but at its
+/// edges, and what those are neither half would know if both were smoothed alike.
 const BRIGHT_LAMP: f32 = 2.0;
 /// Depth as a feature runs from 0 to this.
 const DEPTH_RANGE: f32 = 10.0;
@@ -46,7 +49,7 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Of guides that are not empty.
+    /// Guides made ready for the filter, of which there is at least a pixel.
     pub(super) fn of(guides: &SurfaceGuides) -> Self {
         Self {
             surfaces: Surfaces::of(guides),
@@ -98,8 +101,8 @@ pub(super) fn denoise(picture: &NoisyPicture<'_>, prepared: &Prepared) -> Vec<[f
     (0..count).into_par_iter().map(shown).collect()
 }
 
-/// The mean luminance of all but the brightest hundredth of the picture, in units of which it is filtered: no firefly makes the rest
-/// vanish. The whole's where that is dark, and 1 where there is no light at all.
+/// The mean luminance of all but the brightest hundredth of the picture, in units of which it is filtered: no firefly
+/// makes the rest vanish. The whole's where that is dark, and 1 where there is no light at all.
 fn unit_of(rgb: &[[f32; 3]]) -> f32 {
     let mut bright: Vec<f32> = rgb.par_iter().map(|&rgb| luminance(rgb)).filter(|value| value.is_finite()).collect();
     let mean = |values: &[f32]| {

@@ -1,4 +1,4 @@
-//! Pictures of one channel with a border that may be read.
+//! Pictures of one channel with a border that may be read. Not for values farther out than [`BORDER`].
 
 use super::likeness::WIDEST;
 use super::taps::FARTHEST;
@@ -16,7 +16,7 @@ const _: () = assert!(FARTHEST + WIDEST - TILE <= BORDER, "rows of neighbourhood
 pub(super) enum Beyond {
     /// What its nearest pixel has.
     Edge,
-    /// This.
+    /// This value everywhere.
     Value(f32),
 }
 
@@ -28,7 +28,7 @@ pub(super) struct PaddedPlane {
 }
 
 impl PaddedPlane {
-    /// Of the values `of` pixels in row-major order. The picture is not empty.
+    /// A plane of the values `of` pixels in row-major order. The picture is not empty.
     pub(super) fn new(width: usize, height: usize, beyond: Beyond, of: impl Fn(usize) -> f32 + Sync) -> Self {
         let stride = width.next_multiple_of(TILE) + 2 * BORDER;
         let rows = height.next_multiple_of(TILE) + 2 * BORDER;
@@ -52,7 +52,7 @@ impl PaddedPlane {
         Self { stride, values }
     }
 
-    /// `N` values from a column of a row on; both may be up to [`BORDER`] beyond the picture.
+    /// Reads `N` values from a column of a row on; both may be up to [`BORDER`] beyond the picture.
     #[inline(always)]
     pub(super) fn row<const N: usize>(&self, y: isize, x: isize) -> &[f32; N] {
         let start = (y + BORDER as isize) as usize * self.stride + (x + BORDER as isize) as usize;

@@ -1,4 +1,4 @@
-//! Which neighbours a pixel is averaged with.
+//! Which neighbours a pixel is averaged with. How much each of them counts is left to `likeness`.
 
 use std::collections::BTreeSet;
 
@@ -20,13 +20,13 @@ impl Tap {
     }
 }
 
-/// All of the nearest 24 neighbours, and farther ones along a spiral of the golden angle, which leaves no rows or rings. The pixel
-/// itself is among them.
+/// The neighbours that a pixel is averaged with: all of the nearest 24, and farther ones along a spiral of the golden
+/// angle, which leaves no rows or rings. The pixel itself is among them.
 pub(super) struct Taps(Vec<Tap>);
 
 impl Taps {
-    /// So many, an odd number of at least 25, the k-th pair of the farther ones `spacing_px` · √k beyond the nearest; in order of rows. None is
-    /// farther than [`FARTHEST`].
+    /// Taps around a pixel: so many, an odd number of at least 25, the k-th pair of the farther ones `spacing_px` · √k
+    /// beyond the nearest; in order of rows. None is farther than [`FARTHEST`].
     pub(super) fn around(count: usize, spacing_px: f64) -> Self {
         const INNER: isize = 2;
         let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());

@@ -1,4 +1,4 @@
-//! What the denoiser keeps and what it takes away.
+//! Tests what the denoiser keeps and what it takes away.
 
 use super::*;
 use crate::denoise::Denoiser;

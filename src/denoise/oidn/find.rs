@@ -1,4 +1,4 @@
-//! Where Open Image Denoise may be on this machine.
+//! Lists where Open Image Denoise may be on this machine. To open it is left to `library`.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -14,11 +14,11 @@ const FILE_NAME: &str = if cfg!(windows) {
 
 /// What of the environment says where libraries are.
 pub(super) struct Environment {
-    /// `OIDN_DIR`: the library's folder, or the one above its `lib`.
+    /// Value of `OIDN_DIR`: the library's folder, or the one above its `lib`.
     pub(super) oidn_dir: Option<OsString>,
-    /// `VIRTUAL_ENV`.
+    /// Value of `VIRTUAL_ENV`: the Python environment in use.
     pub(super) virtual_env: Option<OsString>,
-    /// `PATH`, in whose prefixes Python packages are looked for.
+    /// Value of `PATH`, in whose prefixes Python packages are looked for.
     pub(super) path: Option<OsString>,
 }
 

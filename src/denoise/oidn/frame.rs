@@ -1,7 +1,7 @@
 //! Small pictures in a frame of their own mirror images.
 //!
-//! Open Image Denoise lays black around a picture, which its filter spreads inwards: of a lone pixel half of the light is lost. Not for
-//! larger ones, whose middle that does not reach.
+//! Open Image Denoise lays black around a picture, which its filter spreads inwards: of a lone pixel half of the light
+//! is lost. Not for larger ones, whose middle that does not reach.
 
 use super::library::Size;
 use std::borrow::Cow;
@@ -9,7 +9,8 @@ use std::borrow::Cow;
 /// Pixels of a side from which on it has no frame.
 const LEAST_SIDE: usize = 16;
 
-/// Pixels that a shorter one is brought to: by 16 light was still up to 3.6 % off, and 32 are no better (`benches/results/denoising.md`).
+/// Pixels that a shorter side is brought to: 24, since by 16 light is still up to 3.6 % off, and 32 are no better
+/// (`benches/results/denoising.md`).
 const FRAMED_SIDE: usize = 24;
 
 /// A picture's place in the larger one that is denoised in its stead.
@@ -20,7 +21,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// None to be seen around a picture that is large enough, or has no pixels.
+    /// The frame around a picture: none to be seen where that is large enough, or has no pixels.
     pub(super) fn around(picture: Size) -> Self {
         let Size { width, height } = picture;
         let framed_side = |side: usize| if side < LEAST_SIDE { FRAMED_SIDE } else { side };
@@ -31,13 +32,13 @@ impl Frame {
         Self { picture, framed }
     }
 
-    /// Of picture and frame together.
+    /// Size of picture and frame together, in pixels.
     pub(super) fn size(self) -> Size {
         self.framed
     }
 
-    /// Row-major values of the picture with the frame around them. Those that are not the picture's in number stay as they are, for the
-    /// library's caller to refuse.
+    /// Row-major values of the picture with the frame around them. Those that are not the picture's in number stay as
+    /// they are, for the library's caller to refuse.
     pub(super) fn put_around(self, values: &[[f32; 3]]) -> Cow<'_, [[f32; 3]]> {
         if !self.is_seen() || values.len() != self.picture.width * self.picture.height {
             return Cow::Borrowed(values);
@@ -72,7 +73,8 @@ fn margin(side: usize, framed: usize) -> usize {
 /// Which of the picture's pixels each of the framed one's repeats, along one axis: to and fro, the outermost twice.
 fn source_of(side: usize, framed: usize) -> Vec<usize> {
     let there_and_back = 2 * side;
-    // What stands at the first pixel of the frame, that of the picture being a whole number of ways there and back further on.
+    // What stands at the first pixel of the frame, that of the picture being a whole number of ways there and back
+    // further on.
     let first = there_and_back - margin(side, framed) % there_and_back;
     let source = |place: usize| {
         let way = (first + place) % there_and_back;

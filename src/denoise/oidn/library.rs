@@ -46,8 +46,8 @@ struct Functions {
     release_filter: unsafe extern "C" fn(Handle),
 }
 
-// SAFETY: a device may be used from any thread (the library's documentation, "Device"); it is used by one at a time, since
-// `Oidn` keeps it in a mutex. The function pointers are plain addresses.
+// SAFETY: a device may be used from any thread (the library's documentation, "Device"); it is used by one at a time,
+// since `Oidn` keeps it in a mutex. The function pointers are plain addresses.
 unsafe impl Send for Device {}
 
 /// Columns and rows of a picture, which is row-major.
@@ -136,8 +136,9 @@ impl Device {
         }
         let mut output = vec![[0.0f32; 3]; count];
         let f = &self.functions;
-        // SAFETY: every picture has width × height × 3 floats without gaps (checked above), stays borrowed until the filter
-        // is released, and only `output`, which nobody else holds, is written to; the filter's handle is checked.
+        // SAFETY: every picture has width × height × 3 floats without gaps (checked above), stays borrowed
+        // until the filter is released, and only `output`, which nobody else holds, is written to; the
+        // filter's handle is checked.
         unsafe {
             let filter = (f.new_filter)(self.device, c"RT".as_ptr());
             if filter.is_null() {
@@ -183,8 +184,8 @@ impl Drop for Device {
 
 impl Functions {
     fn of(library: &Library) -> Result<Self, libloading::Error> {
-        // SAFETY: each name has this signature in oidn.h of every version 2; the addresses live as long as the library, which
-        // stands beside them.
+        // SAFETY: each name has this signature in oidn.h of every version 2; the addresses live as long as the library,
+        // which stands beside them.
         unsafe {
             Ok(Self {
                 new_device: *library.get(b"oidnNewDevice\0")?,

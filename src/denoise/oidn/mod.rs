@@ -19,7 +19,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 /// Why Open Image Denoise cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum OidnError {
-    /// None of the places has it.
+    /// The library is in none of the places.
     #[error(
         "Open Image Denoise (version 2) is not found: set OIDN_DIR to the folder of its release, install the system's \
          package, or `pip install pyoidn` in a Python environment that is active; --denoise builtin needs nothing{}",
@@ -43,8 +43,8 @@ fn tried(problems: &[String]) -> String {
     problems.iter().map(|problem| format!("\n  tried {problem}")).collect()
 }
 
-/// Guides of as many samples are trusted as they are: to denoise them costs half as much again as picture and halves do, and is
-/// worth 0.011 JOD where a shutter is open, 0.002 and 0.004 elsewhere (`benches/results/denoising.md`).
+/// Guides of as many samples are trusted as they are: to denoise them costs half as much again as picture and halves
+/// do, and is worth 0.011 JOD where a shutter is open, 0.002 and 0.004 elsewhere (`benches/results/denoising.md`).
 const CLEAN_ENOUGH_SAMPLES: f64 = 16.0;
 
 /// The library, opened.
@@ -107,8 +107,8 @@ impl Oidn {
         format!("Open Image Denoise {}", in_words(self.version))
     }
 
-    /// Albedo and normal without the noise of edges, lenses and shutters, as far as that matters: guides that [`Self::denoise`] may
-    /// trust.
+    /// Albedo and normal without the noise of edges, lenses and shutters, as far as that matters: guides that
+    /// [`Self::denoise`] may trust.
     pub(super) fn prepare(&self, guides: SurfaceGuides) -> Result<SurfaceGuides, OidnError> {
         if guides.samples_of_picture >= CLEAN_ENOUGH_SAMPLES {
             return Ok(guides);

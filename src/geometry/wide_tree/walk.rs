@@ -1,12 +1,12 @@
-//! The two walks over the tree: to the closest hit, and to any.
+//! The two walks over the tree: to the closest hit, and to any. The tests of boxes and triangles are left to [`super`].
 
 use super::{Block, Candidates, Child, LANES, Met, Node, WideHit, WideTree};
 use crate::geometry::simd;
 use crate::geometry::triangle::{ShearedRay, TriangleHit};
 use smallvec::SmallVec;
 
-/// Children that wait while a walk is below their siblings: on the heap only where there are more than any tree of ours had, and never
-/// cleared, which took 3 % of the Cornell box.
+/// Children that wait while a walk is below their siblings. On the heap only where there are more than any tree of ours
+/// had, and never cleared: to clear it takes 3 % of the Cornell box.
 type Stack = SmallVec<[u64; 96]>;
 
 /// What a child points at.
@@ -16,8 +16,8 @@ enum Below<'a> {
 }
 
 impl WideTree {
-    /// The walk of [`Self::closest`], over any pair of kernels: `meet` gives the children of a node, `hits` the triangles
-    /// of a block that the ray meets before a distance.
+    /// The walk of [`Self::closest`], over any pair of kernels: `meet` gives the children of a node, `hits` the
+    /// triangles of a block that the ray meets before a distance.
     #[inline(always)]
     pub(in crate::geometry) fn walk_closest(
         &self,
@@ -189,7 +189,8 @@ fn hit_of_lane(block: &Block, found: &Candidates, lane: u32, sheared: &ShearedRa
     Some(TriangleHit { t, b1: found.b1.get(lane), b2: found.b2.get(lane) })
 }
 
-/// Whether a hit is before the end of a ray, which may lie just before the same triangle: where it is close, by its plane, too.
+/// Whether a hit is before the end of a ray, which may lie just before the same triangle: where it is close, by its
+/// plane, too.
 #[inline(always)]
 fn is_before(hit: &TriangleHit, t_max: f32, to_plane: impl Fn() -> Option<f32>) -> bool {
     const CLOSE: f32 = 0.99;

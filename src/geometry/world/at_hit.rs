@@ -21,8 +21,8 @@ pub(super) struct Placement {
     flip: f32,
     /// Whether the material asks for a tangent.
     needs_tangent: bool,
-    /// The tree that the mesh shares with others or moves with, in coordinates of its own; `None` where it is part of the fixed
-    /// tree, in world space.
+    /// The tree that the mesh shares with others or moves with, in coordinates of its own; `None` where it is part of
+    /// the fixed tree, in world space.
     shared: Option<u32>,
 }
 
@@ -40,8 +40,8 @@ impl Placement {
         Self { normal_matrix: cofactors * flip, flip, ..self }
     }
 
-    /// A shading normal in the world, of the mean of the corners' normals in the mesh. A file may wind its triangles against its normals; the
-    /// geometric side is what counts.
+    /// A shading normal in the world, of the mean of the corners' normals in the mesh. A file may wind its triangles
+    /// against its normals; the geometric side is what counts.
     #[inline(always)]
     fn blended_normal(&self, of_corners: Vec3, geometric_normal: Vec3) -> Vec3 {
         let n = Vec3::from(self.normal_matrix * Vec3A::from(of_corners)).normalize_or(geometric_normal);
@@ -60,8 +60,8 @@ impl World {
         self.scene.spheres[object as usize - self.scene.instances.len()].place_at(time)
     }
 
-    /// The translation of a transform that puts a mesh into the world where its tree is in coordinates of its own; zero where that is
-    /// in world space.
+    /// The translation of a transform that puts a mesh into the world where its tree is in coordinates of its own; zero
+    /// where that is in world space.
     pub(crate) fn translation_of_tree(&self, object: u32, to_world: &Affine3A) -> Vec3A {
         match self.placements[object as usize].shared {
             None => Vec3A::ZERO,
@@ -74,14 +74,15 @@ impl World {
         self.placed_corners(object, triangle, &self.transform_at(object, time))
     }
 
-    /// The same of an instance that is placed so.
+    /// World-space corners of a triangle of an instance that this transform places.
     pub(crate) fn placed_corners(&self, object: u32, triangle: u32, to_world: &Affine3A) -> [Vec3; 3] {
         let mesh = &self.scene.meshes[self.scene.instances[object as usize].mesh.0 as usize];
         mesh.triangles[triangle as usize].map(|i| to_world.transform_point3(mesh.positions[i as usize]))
     }
 
-    /// How the surface at a point goes along with its texture coordinates, at a share of the open shutter; `None` where it has
-    /// none, or they do not span it (the poles of spheres, triangles whose corners share a place in the picture).
+    /// How the surface at a point goes along with its texture coordinates, at a share of the open shutter; `None` where
+    /// it has none, or they do not span it (the poles of spheres, triangles whose corners share a place in the
+    /// picture).
     pub fn derivatives(&self, point: &SurfacePoint, time: f32) -> Option<SurfaceDerivatives> {
         let derivatives = match self.scene.instances.get(point.object as usize) {
             None => sphere_derivatives(&self.sphere_at(point.object, time), point.geometric_normal.into()),

@@ -120,7 +120,8 @@ fn sphere_around(bounds: &[Bounds]) -> Ball {
     Ball { center: center.into(), radius: (bounds.max - center).length().max(f32::MIN_POSITIVE) }
 }
 
-/// Items in the order in which they are met, with a tree over them where they are many; those without a finite box are left out.
+/// Items in the order in which they are met, with a tree over them where they are many; those without a finite box are
+/// left out.
 fn arranged(BoundedItems { items, bounds }: BoundedItems) -> (Option<BinaryTree>, Vec<Item>) {
     if items.len() <= FEW {
         let finite = items.into_iter().zip(bounds).filter(|(_, bounds)| bounds.is_finite());
@@ -160,7 +161,8 @@ fn fixed_triangles(scene: &Scene, uses: &[u32]) -> Vec<([Vec3A; 3], TriangleRef)
     triangles
 }
 
-/// Vertices of all placed instances up to which boxes are made around each; of more, around the corners of the meshes' boxes.
+/// Vertices of all placed instances up to which boxes are made around each; of more, around the corners of the meshes'
+/// boxes.
 const MOST_VERTICES: usize = 30_000_000;
 
 /// What a box is made around.

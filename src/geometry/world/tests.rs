@@ -1,4 +1,4 @@
-//! Two levels against one, and mirrored instances.
+//! Tests two levels against one, and mirrored instances.
 
 use super::*;
 use crate::scene::{ColorInput, Instance, Material, Mesh, MeshId, Sphere, Surface};
@@ -124,8 +124,8 @@ fn self_hits(world: &World, aims: &[(Vec3A, f32)]) -> usize {
     met_again
 }
 
-/// Rays leave what they hit without meeting it again, near the origin and far from it, in a tree of its own and in the common one,
-/// beside something small or huge.
+/// Rays leave what they hit without meeting it again, near the origin and far from it, in a tree of its own and in the
+/// common one, beside something small or huge.
 #[test]
 fn no_ray_meets_the_triangle_that_it_leaves() {
     let turned = |scale: f32, at: Vec3| {
@@ -166,7 +166,8 @@ fn no_ray_meets_the_triangle_of_a_mesh_that_is_moved_back() {
     }
 }
 
-/// Planks two hundred and two thousand times as long as wide, turned, do not shadow themselves, nor a lamp of that shape itself.
+/// Planks two hundred and two thousand times as long as wide, turned, do not shadow themselves, nor a lamp of that
+/// shape itself.
 #[test]
 fn long_thin_triangles_do_not_meet_their_own_rays() {
     for width in [0.02, 0.002] {

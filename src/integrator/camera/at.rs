@@ -23,31 +23,32 @@ impl<'a> CameraAt<'a> {
         self.camera.ray(&CameraSample { position_px, lens, time: self.time })
     }
 
-    /// The same through the middle of the lens.
+    /// The ray through a place in the picture, in pixels, and the middle of the lens.
     pub(in crate::integrator) fn ray_through(&self, position_px: Vec2) -> Ray {
         self.ray(position_px, [0.5; 2])
     }
 
-    /// From where rays begin that pass a world position, to there; of any length.
+    /// The way to a world position from where the rays begin that pass it; of any length.
     pub(in crate::integrator) fn way_to(&self, position: Vec3) -> Vec3 {
         let ray = self.project(position).map(|position_px| self.ray_through(position_px));
         ray.map_or(Vec3::ZERO, |ray| position - Vec3::from(ray.origin))
     }
 
-    /// Place in the picture, in pixels, of a world position seen from the middle of the lens; `None` at and behind the lens.
+    /// Place in the picture, in pixels, of a world position seen from the middle of the lens; `None` at and behind the
+    /// lens.
     pub(in crate::integrator) fn project(&self, position: Vec3) -> Option<Vec2> {
         self.project_resting(self.resting(position))
     }
 
-    /// Place in the picture, in pixels, of what is infinitely far in a world direction; `None` beside and behind the lens,
-    /// and where rays are parallel.
+    /// Place in the picture, in pixels, of what is infinitely far in a world direction; `None` beside and behind the
+    /// lens, and where rays are parallel.
     pub(super) fn project_direction(&self, direction: Vec3) -> Option<Vec2> {
         let direction = self.to_rest.map_or(direction, |to_rest| to_rest.transform_vector3(direction));
         if self.camera.parallel { None } else { self.project_way(direction) }
     }
 
-    /// Place in the picture, in pixels, at which a point of the lens, by its [`CameraSample::lens`], sees a world position; `None` at and behind
-    /// the lens.
+    /// Place in the picture, in pixels, at which a point of the lens, by its [`CameraSample::lens`], sees a world
+    /// position; `None` at and behind the lens.
     pub(in crate::integrator) fn project_through(&self, lens: [f32; 2], position: Vec3) -> Option<Vec2> {
         let position = self.resting(position);
         let middle = self.project_resting(position)?;
@@ -56,8 +57,8 @@ impl<'a> CameraAt<'a> {
         Some(middle + self.to_pixels(-self.spread(self.depth_of(position)) * on_lens) - self.camera.center)
     }
 
-    /// How far to the side and up, in pixels, the rays are spread through which the lens sees a world position: the half axes of its circle
-    /// of confusion.
+    /// How far to the side and up, in pixels, the rays are spread through which the lens sees a world position: the
+    /// half axes of its circle of confusion.
     pub(in crate::integrator) fn blur_px(&self, position: Vec3) -> Vec2 {
         let spread = self.spread(self.depth_of(self.resting(position))).abs();
         let along = |lens: Vec3, pixel: Vec3| spread * lens.length() / pixel.length();
@@ -80,8 +81,8 @@ impl<'a> CameraAt<'a> {
         (position - self.camera.position).dot(self.camera.forward)
     }
 
-    /// What the rays through a point at this depth are spread by, on the plane that [`CameraRays::pixel_right`] is on, over their spread on the
-    /// lens.
+    /// What the rays through a point at this depth are spread by, on the plane that [`CameraRays::pixel_right`] is on,
+    /// over their spread on the lens.
     fn spread(&self, depth: f32) -> f32 {
         let focus_distance = self.camera.focus_distance;
         if self.camera.parallel { 1.0 - depth / focus_distance } else { 1.0 / depth - 1.0 / focus_distance }

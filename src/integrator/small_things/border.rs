@@ -1,8 +1,8 @@
 //! Light right beyond the film's border, into which the pixel filter of the outermost pixels reaches.
 //!
-//! No pixel of the film is covered by it, so that nothing in the picture tells of what few samples meet: of a ball of light half a pixel beyond,
-//! six renders in eight found nothing and stopped at 16 samples, 77 times above threshold. Only lamps and the sky are looked for, that cameras see
-//! straight; what they are compared with may be lit.
+//! No pixel of the film is covered by it, so that nothing in the picture tells of what few samples meet: of a ball of
+//! light half a pixel beyond, six renders in eight find nothing and stop at 16 samples, 77 times above threshold. Only
+//! lamps and the sky are looked for, that cameras see straight; what they are compared with may be lit.
 
 use super::luminances::{LEAST_CONTRAST, Luminances};
 use super::shares::{Piece, Shares};
@@ -51,8 +51,8 @@ impl PathTracer {
         }
     }
 
-    /// By how much the luminance beyond differs from that inside, scene units; 0 where that is little, or no light is seen straight. From points
-    /// of the lens, and at moments, that change from one number to the next.
+    /// By how much the luminance beyond differs from that inside, scene units; 0 where that is little, or no light is
+    /// seen straight. From points of the lens, and at moments, that change from one number to the next.
     fn difference_beyond(&self, Beyond { place_px, inside_px }: &Beyond, number: usize) -> f32 {
         let key = BlockKey::of_probe(STREAM, Pixel { x: number as u32, y: 0 });
         let ray_of = |place_px: Vec2, index: u32| {

@@ -1,6 +1,8 @@
-//! Small things that others light, or whose emission is a picture: which ones are unlike all that is around them, and by how much.
+//! Small things that others light, or whose emission is a picture: which ones are unlike all that is around them, and
+//! by how much.
 //!
-//! Nothing says how bright they are but paths to them. Not for pieces of something larger, of which neighbouring pixels tell.
+//! Nothing says how bright they are but paths to them. Not for pieces of something larger, of which
+//! neighbouring pixels tell.
 
 use super::luminances::Luminances;
 use super::spots::Spot;
@@ -14,8 +16,8 @@ use glam::Vec2;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Triangles and spheres that are looked at, of objects with the fewest triangles first; the rest is left to chance. Each takes 3 µs: some of
-/// what the first samples of a pixel take.
+/// Triangles and spheres that are looked at, of objects with the fewest triangles first; the rest is left to chance.
+/// Each takes 3 µs: some of what the first samples of a pixel take.
 const FACETS_A_PIXEL: f32 = 0.25;
 const FEWEST_FACETS: usize = 1 << 12;
 const MOST_FACETS: usize = 1 << 16;
@@ -43,8 +45,8 @@ pub(super) fn most_facets(pixels: usize) -> usize {
     ((FACETS_A_PIXEL * pixels as f32) as usize).clamp(FEWEST_FACETS, MOST_FACETS)
 }
 
-/// Pieces of objects that do not shine evenly, in one order at any time, of those with the fewest first. `is_asked`: for what moves, or does not.
-/// Not of what alpha covers in part: a ray meets all of it or nothing.
+/// Pieces of objects that do not shine evenly, in one order at any time, of those with the fewest first. `is_asked`:
+/// for what moves, or does not. Not of what alpha covers in part: a ray meets all of it or nothing.
 pub(super) fn parts_at(
     world: &World,
     most: usize,
@@ -125,7 +127,8 @@ impl PathTracer {
         self.world.closest(ray).is_some_and(|hit| self.world.material_of(hit.object) == material)
     }
 
-    /// How bright a spot of a lamp is, or how much another one differs from what is around it; 0 where that is too little, or cannot be told.
+    /// How bright a spot of a lamp is, or how much another one differs from what is around it; 0 where that is too
+    /// little, or cannot be told.
     fn luminance_at(&self, camera: &CameraAt<'_>, spot: &Spot, number: usize, moment: &Moment) -> f32 {
         let object = match spot.shine {
             Shine::Known(luminance) => return luminance,
@@ -141,7 +144,8 @@ impl PathTracer {
     }
 }
 
-/// For each spot the one whose luminance it has: of those of one object every so many are asked, and their next neighbours are like them.
+/// For each spot the one whose luminance it has: of those of one object every so many are asked, and their next
+/// neighbours are like them.
 fn asked_for(spots: &[Spot], alike: usize) -> Vec<usize> {
     let (mut asked, mut latest) = (Vec::with_capacity(spots.len()), 0);
     for (number, spot) in spots.iter().enumerate() {

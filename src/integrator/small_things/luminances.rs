@@ -1,6 +1,7 @@
-//! How far apart two brightnesses are of which a few paths each tell.
+//! Tells how far apart two brightnesses are of which a few paths each tell.
 
-/// What is less, over the darker surroundings, is left to chance: of a sixteenth of a pixel sixteen samples would scatter by 2 %.
+/// What is less, over the darker surroundings, is left to chance: of a sixteenth of a pixel sixteen samples would
+/// scatter by 2 %.
 pub(super) const LEAST_CONTRAST: f32 = 0.3;
 /// So is what is fewer standard errors of these paths.
 const LEAST_ERRORS: f32 = 2.0;

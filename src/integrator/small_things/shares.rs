@@ -1,4 +1,4 @@
-//! What pieces of small things bring to the film's pixels.
+//! Adds up what pieces of small things bring to the film's pixels.
 
 use super::super::Crop;
 use crate::film::KnownThings;
@@ -8,14 +8,14 @@ use std::f64::consts::PI;
 
 /// A piece of something, as a point of the lens sees it at a moment.
 pub(super) struct Piece {
-    /// Its middle.
+    /// Middle of the piece in the picture, px.
     pub(super) place_px: Vec2,
     /// How far it goes meanwhile, half of it before it is there.
     pub(super) way_px: Vec2,
     pub(super) area_px2: f32,
     /// Half axes of the ellipse that its light is spread over, where they are at least a pixel.
     pub(super) spread_px: Vec2,
-    /// Of it, or by how much that is unlike what is around it; scene units.
+    /// Luminance of the piece, or by how much it is unlike what is around it; scene units.
     pub(super) luminance: f32,
     /// Whether its pixels are to have samples for it whatever it looks like.
     pub(super) is_urgent: bool,
@@ -29,7 +29,7 @@ pub(super) struct Shares {
 }
 
 impl Shares {
-    /// None yet.
+    /// Shares of no pieces yet.
     pub(super) fn new(area: Crop, density: FilterDensity) -> Self {
         Self { area, density, things: KnownThings::new(area.pixels()) }
     }
@@ -55,8 +55,8 @@ impl Shares {
         of_each * f64::from(self.steps(spread_px, way_px))
     }
 
-    /// At how many places on its way a piece is added: no farther apart than a pixel, or than half of what it is spread over; on a way that is
-    /// longer than the film, fewer.
+    /// At how many places on its way a piece is added: no farther apart than a pixel, or than half of what it is spread
+    /// over; on a way that is longer than the film, fewer.
     fn steps(&self, spread_px: Vec2, way_px: Vec2) -> u32 {
         let longest_px = if is_spread(spread_px) { spread_px.min_element() } else { 1.0 };
         let most = 2 * (self.area.width + self.area.height);

@@ -1,4 +1,4 @@
-//! Lamps and other things cut into spots that a camera sees at a moment.
+//! Cuts lamps and other things into spots that a camera sees at a moment. Which pixels they meet is left to `shares`.
 
 use super::super::Crop;
 use super::super::camera::CameraAt;
@@ -10,14 +10,16 @@ use std::f32::consts::{PI, TAU};
 
 /// Strips are cut into slices no longer than this share of what is small where they are.
 const SLICE: f32 = 0.5;
-/// Triangles that are higher than this over their longest side, in pixels, or than what is small by blur and motion, are not looked for: they
-/// cover some pixels nearly whole.
+/// Triangles that are higher than this over their longest side, in pixels, or than what is small by blur and motion,
+/// are not looked for: they cover some pixels nearly whole.
 const THICK_PX: f32 = 1.5;
-/// Farther outside the film nothing shines into it, in pixels, but for its blur and its motion: strips are no higher, and pixel filters no wider.
+/// Farther outside the film nothing shines into it, in pixels, but for its blur and its motion: strips are no higher,
+/// and pixel filters no wider.
 const BORDER_PX: f32 = 3.5;
 /// What is blurred no wider than this, in pixels, is seen as from the middle of the lens.
 const LEAST_BLUR_PX: f32 = 0.25;
-/// Each point of the lens sees a spot at a place of its own; between these, its light is spread as far as this, over the blur.
+/// Each point of the lens sees a spot at a place of its own; between these, its light is spread as far as this, over
+/// the blur.
 const SPREAD: f32 = 0.25;
 /// What passes by in less than this share of the time that the shutter is open is small.
 const BRIEF: f32 = 0.25;
@@ -25,7 +27,7 @@ const BRIEF: f32 = 0.25;
 /// A spot of something.
 pub(super) struct Spot {
     pub(super) position: Vec3,
-    /// In the picture, were it sharp.
+    /// Area of the spot in the picture, were it sharp, px².
     pub(super) area_px2: f32,
     /// How far before its position its surface may be, scene units.
     pub(super) radius: f32,
@@ -81,7 +83,7 @@ impl Around {
 }
 
 impl<'a> Spots<'a> {
-    /// None yet. `later`: the camera `step` later. `most`: how many there may be.
+    /// A list of no spots yet. `later`: the camera `step` later. `most`: how many there may be.
     pub(super) fn new(camera: CameraAt<'a>, later: CameraAt<'a>, step: f32, area: Crop, most: usize) -> Self {
         Self { camera, later, step, area, most, found: Vec::new() }
     }
@@ -109,7 +111,8 @@ impl<'a> Spots<'a> {
         Some(Around { blur_px: self.camera.blur_px(center), velocity_px: way_px / self.step })
     }
 
-    /// A sphere that is smaller than a pixel, or than what is small there, as spots of one size: what is before its middle may hide it in part.
+    /// A sphere that is smaller than a pixel, or than what is small there, as spots of one size: what is before its
+    /// middle may hide it in part.
     fn add_sphere(&mut self, center: Vec3, radius: f32, around: Around, shine: Shine) {
         /// Spots around the one in the middle.
         const AROUND: usize = 6;
@@ -144,8 +147,8 @@ impl<'a> Spots<'a> {
         place_px.cmpge(low - border_px).all() && place_px.cmple(high + border_px).all()
     }
 
-    /// A triangle that is smaller than what is small there, in slices across its longest side. Nothing of one that is thick, or not wholly before
-    /// the camera.
+    /// A triangle that is smaller than what is small there, in slices across its longest side. Nothing of one that is
+    /// thick, or not wholly before the camera.
     fn add_triangle(&mut self, corners: [Vec3; 3], around: Around, shine: Shine) {
         let Some(places_px) = each(corners, |corner| self.camera.project(corner)) else { return };
         let small_px = around.small_px();

@@ -1,4 +1,4 @@
-//! Long and thin triangles in the picture, cut across.
+//! Cuts long and thin triangles in the picture across. Those that are higher than the caller allows are left out.
 
 use super::super::Crop;
 use glam::DVec2;
@@ -17,13 +17,13 @@ pub(super) struct Strip {
 
 /// A piece of it.
 pub(super) struct Slice {
-    /// Its middle.
+    /// Middle of the slice in the picture, px.
     pub(super) place_px: DVec2,
     pub(super) area_px2: f64,
 }
 
 impl Strip {
-    /// `None` of what is higher than so many pixels, or no triangle.
+    /// The strip of a triangle in the picture; `None` of what is higher than so many pixels, or no triangle.
     pub(super) fn of(corners_px: [DVec2; 3], highest_px: f64) -> Option<Self> {
         let [a, b, c] = (0..3).map(|i| [0, 1, 2].map(|k| corners_px[(i + k) % 3])).max_by(|one, other| {
             let side = |corners: &[DVec2; 3]| corners[0].distance_squared(corners[1]);
@@ -42,7 +42,8 @@ impl Strip {
         })
     }
 
-    /// Its slices, no longer than so many pixels, that are no farther from an area of the picture than `border_px`.
+    /// Slices of the strip, no longer than so many pixels, that are no farther from an area of the picture than
+    /// `border_px`.
     pub(super) fn slices(&self, area: Crop, longest_px: f64, border_px: f64) -> impl Iterator<Item = Slice> {
         let count = (self.length_px / longest_px).ceil().max(1.0);
         let step_px = self.length_px / count;

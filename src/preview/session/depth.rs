@@ -11,9 +11,9 @@ use glam::Vec2;
 const ASKED_PIXELS: usize = 1 << 12;
 
 impl Session<'_> {
-    /// The camera turns about what stands in the middle of the picture, else about what stands as far away as half of all that is
-    /// seen, else about as far as the scene's middle; and about the same as long as it moves. What is in focus says nothing: formats
-    /// give pinholes a focus a million units away.
+    /// The camera turns about what stands in the middle of the picture, else about what stands as far away as half of
+    /// all that is seen, else about as far as the scene's middle; and about the same as long as it moves. What is in
+    /// focus says nothing: formats give pinholes a focus a million units away.
     pub(super) fn find_pivot(&mut self) {
         let is_in_motion = self.phase == Phase::Moving && self.hand.was_ever_moved();
         if is_in_motion && self.hand.held.knows_pivot {
@@ -27,8 +27,8 @@ impl Session<'_> {
         }
     }
 
-    /// Distance of what a pixel shows along the camera's axis, as focus and pivot count it, from whichever film has it; none where nothing is or the
-    /// picture is of another camera.
+    /// Distance of what a pixel shows along the camera's axis, as focus and pivot count it, from whichever film has it;
+    /// none where nothing is or the picture is of another camera.
     fn depth_at(&self, x: usize, y: usize) -> Option<f32> {
         let in_film = |(film, step): (&Film, usize)| {
             let (column, row, width) = (x / step, y / step, film.width() as usize);
@@ -55,7 +55,8 @@ impl Session<'_> {
         self.films().find_map(in_film)
     }
 
-    /// Films of what the camera sees, and pixels of the picture to each of theirs; none while the camera is another than theirs.
+    /// Films of what the camera sees, and pixels of the picture to each of theirs; none while the camera is another
+    /// than theirs.
     fn films(&self) -> impl Iterator<Item = (&Film, usize)> {
         let glimpse = self.glimpse.as_ref().map(|glimpse| (&glimpse.film, glimpse.step as usize));
         std::iter::once((&self.state.film, 1)).chain(glimpse).filter(|_| !self.hand.has_moved())
@@ -70,7 +71,7 @@ impl Session<'_> {
         Some(distance).filter(|distance| distance.is_normal())
     }
 
-    /// Of the angle between the ray through a pixel's middle and the camera's axis.
+    /// Cosine of the angle between the ray through a pixel's middle and the camera's axis.
     fn cosine_at(&self, x: usize, y: usize) -> f32 {
         let settings = self.tracer.settings();
         let (left, top) = (settings.film_area().x, settings.film_area().y);

@@ -1,7 +1,7 @@
 //! The pointer as gaze: thresholds are those of an eye that looks where it points.
 //!
-//! A new place means new thresholds, which cost a look. So a gaze is followed when it has gone farther than the eye's own margin,
-//! and not so often that looks would be most of the work.
+//! A new place means new thresholds, which cost a look. So a gaze is followed when it has gone farther than the eye's
+//! own margin, and not so often that looks would be most of the work.
 
 use crate::preview::shared::Shared;
 use fechner_perception::display::PixelDensity;

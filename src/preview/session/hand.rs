@@ -1,4 +1,4 @@
-//! The hand that moves the camera.
+//! The hand that moves the camera. Where it goes is left to `orbit`.
 
 use crate::preview::orbit::Held;
 use crate::scene::Camera;
@@ -17,7 +17,7 @@ pub(super) struct Hand {
 }
 
 impl Hand {
-    /// Before the first picture, which begins as one after a movement does.
+    /// The hand before the first picture, which begins as one after a movement does.
     pub(super) fn at_home(camera: &Camera) -> Self {
         Self { held: Held::at_home(camera), has_moved: true, moved_at: None }
     }
@@ -33,7 +33,7 @@ impl Hand {
         self.has_moved
     }
 
-    /// The same, asked by who makes the picture of this camera now.
+    /// Whether the picture is of another camera, asked by who makes the picture of this one now: it is not afterwards.
     pub(super) fn take_movement(&mut self) -> bool {
         std::mem::take(&mut self.has_moved)
     }

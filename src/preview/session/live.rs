@@ -1,4 +1,4 @@
-//! What viewers change while a picture is made, and the settings that come of it.
+//! What viewers change while a picture is made, and the settings that come of it. To act on them is left to `obeying`.
 
 use crate::adaptive::settings::{Limits, LoopSettings};
 use crate::preview::Job;
@@ -14,7 +14,7 @@ pub(super) struct Live {
     pub(super) operator: Option<String>,
     /// A preset's name, or the job's own display's.
     pub(super) display: Option<String>,
-    /// In distances that the display is made for.
+    /// Distance of the eyes, in distances that the display is made for.
     pub(super) distance: Option<f64>,
     pub(super) visibility: Option<f64>,
     /// Where somebody looks.

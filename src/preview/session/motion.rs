@@ -33,7 +33,7 @@ impl Neighbours {
 }
 
 impl Session<'_> {
-    /// Another camera or scene: what moves is not known any more.
+    /// Forgets what moves, as it is not known any more of another camera or scene.
     pub(super) fn forget_motion(&mut self) {
         self.screen.motion = Motion::Unknown("the scenes a frame before and after are being read");
     }

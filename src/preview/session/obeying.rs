@@ -1,4 +1,4 @@
-//! What viewers ask for, done.
+//! Does what viewers ask for.
 
 use super::live::{Changed, Live, settings_of};
 use super::problems::Cause;

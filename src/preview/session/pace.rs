@@ -1,4 +1,5 @@
-//! How many samples make a batch, so that neither a frame that is due nor a viewer's wish waits for longer than one sees.
+//! How many samples make a batch, so that neither a frame that is due nor a viewer's wish waits for longer than one
+//! sees.
 
 use std::time::{Duration, Instant};
 
@@ -34,8 +35,8 @@ impl Pace {
         self.in_batch += samples;
     }
 
-    /// The batch that was counted is done: the next follows its rate, at most four times as large, and is over within half the time
-    /// between two frames, if there are any.
+    /// The batch that was counted is done: the next follows its rate, at most four times as large, and is over within
+    /// half the time between two frames, if there are any.
     pub(in crate::preview) fn counted(&mut self, between_frames: Option<Duration>) {
         let rate = self.in_batch as f64 / self.begun.elapsed().as_secs_f64().max(1e-6);
         let next = (rate * length(between_frames).as_secs_f64()) as u64;

@@ -1,4 +1,4 @@
-//! What went wrong and has not gone right since.
+//! Keeps what went wrong and has not gone right since.
 
 use std::collections::BTreeMap;
 
@@ -20,17 +20,17 @@ pub(super) enum Cause {
 pub(super) struct Problems(BTreeMap<Cause, String>);
 
 impl Problems {
-    /// It went wrong.
+    /// Notes that something went wrong.
     pub(super) fn meet(&mut self, cause: Cause, problem: String) {
         self.0.insert(cause, problem);
     }
 
-    /// It went right.
+    /// Notes that something went right, which ends its problem.
     pub(super) fn solve(&mut self, cause: Cause) {
         self.0.remove(&cause);
     }
 
-    /// All of them, a line each; `None` where there is none.
+    /// Lists the problems, a line each; `None` where there is none.
     pub(super) fn told(&self) -> Option<String> {
         let problems: Vec<&str> = self.0.values().map(String::as_str).collect();
         (!problems.is_empty()).then(|| problems.join("\n"))

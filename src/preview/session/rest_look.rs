@@ -1,4 +1,4 @@
-//! What was seen of a picture at rest, or is to be seen.
+//! Keeps what was seen of a picture at rest, or is to be seen. The look itself is taken elsewhere.
 
 use super::live::Changed;
 use crate::adaptive::{LastLook, StopReason};
@@ -15,14 +15,14 @@ pub(super) struct Unlooked {
 /// The look at the picture that rests; empty while none does.
 #[derive(Default)]
 pub(super) struct RestLook {
-    /// Of the picture that rests, once it was looked at.
+    /// The look at the picture that rests, once there was one.
     pub(super) last: Option<LastLook>,
-    /// While it rests and was not looked at as it is.
+    /// Why it rested before and what has changed, while it rests and was not looked at as it is.
     pub(super) unlooked: Option<Unlooked>,
 }
 
 impl RestLook {
-    /// The picture was looked at as it is.
+    /// The look at a picture that was looked at as it is.
     pub(super) fn of(last: LastLook) -> Self {
         Self { last: Some(last), unlooked: None }
     }

@@ -1,4 +1,4 @@
-//! Pictures that a viewer asks for, written where fechner was started.
+//! Writes pictures that a viewer asks for where fechner was started.
 
 use super::Session;
 use super::problems::Cause;

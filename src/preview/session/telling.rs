@@ -1,4 +1,4 @@
-//! What a session says of itself.
+//! Tells viewers how a session goes.
 
 use super::Session;
 use crate::adaptive::settings::LoopSettings;
@@ -50,7 +50,7 @@ impl Session<'_> {
     }
 }
 
-/// Of a render that has not begun.
+/// The status of a render that has not begun.
 pub(in crate::preview) fn blank_status(scene: &Scene, settings: &LoopSettings, operator: &str, held: &Held) -> Status {
     Status {
         kind: "status",

@@ -1,5 +1,5 @@
-//! Commands about a picture that is not there yet: they wait until the camera's movement was acted on and the film has something
-//! of every pixel.
+//! Commands about a picture that is not there yet: they wait until the camera's movement was acted on and the film has
+//! something of every pixel.
 
 use super::Session;
 use crate::adaptive::state::RenderState;
@@ -7,8 +7,8 @@ use crate::preview::command::{Command, Phase};
 use crate::sampler::Half;
 
 impl Session<'_> {
-    /// Whether it would be done to a picture before the one that it is meant for, or to one that is not whole. What has stopped is
-    /// as whole as its limits let it be.
+    /// Whether it would be done to a picture before the one that it is meant for, or to one that is not whole. What has
+    /// stopped is as whole as its limits let it be.
     pub(super) fn must_wait(&self, command: &Command) -> bool {
         let is_in_motion = self.hand.has_moved() || self.phase == Phase::Moving;
         let is_whole = || self.phase == Phase::Stopped || is_whole(&self.state);
@@ -20,7 +20,8 @@ impl Session<'_> {
         }
     }
 
-    /// Keeps a command until it can be done. A pause in the first pass ends for what needs all of that pass, and comes back after a file.
+    /// Keeps a command until it can be done. A pause in the first pass ends for what needs all of that pass,
+    /// and comes back after a file.
     pub(super) fn let_wait(&mut self, command: Command) {
         let is_file = matches!(command, Command::Save { .. });
         let breaks_a_pause = self.phase == Phase::Paused && !self.hand.has_moved();

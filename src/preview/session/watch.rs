@@ -1,4 +1,5 @@
-//! What the loop tells while it runs: frames and figures between batches, and the way out when somebody asks for something.
+//! What the loop tells while it runs: frames and figures between batches, and the way out when somebody asks for
+//! something.
 
 use super::gaze::Follower;
 use super::pace::Pace;
@@ -37,7 +38,7 @@ pub(super) struct Watch<'a> {
 /// What changes meanwhile.
 pub(super) struct Moving<'a> {
     pub(super) screen: &'a mut Screen,
-    /// Until the film shows more.
+    /// The glimpse that is shown until the film shows more.
     pub(super) glimpse: &'a mut Option<Glimpse>,
     pub(super) pace: &'a mut Pace,
     pub(super) progress: &'a mut Option<Progress>,

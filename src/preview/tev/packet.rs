@@ -1,7 +1,7 @@
 //! What tev understands: packets of its inter-process protocol (github.com/Tom94/tev, `include/tev/Ipc.h`).
 //!
-//! Every packet begins with its length in bytes, these four included, and a byte for its kind. Numbers are little-endian, text
-//! ends with a zero byte, truth is a byte of 0 or 1.
+//! Every packet begins with its length in bytes, these four included, and a byte for its kind. Numbers are
+//! little-endian, text ends with a zero byte, truth is a byte of 0 or 1.
 
 const UPDATE_IMAGE_V3: u8 = 6;
 const CREATE_IMAGE: u8 = 4;
@@ -23,7 +23,7 @@ pub(super) fn create(name: &str, width: u32, height: u32, channels: &[&str]) -> 
     finish(packet)
 }
 
-/// All values of a layer of such a picture.
+/// A packet with all values of a layer of such a picture.
 pub(super) fn update(name: &str, width: u32, height: u32, layer: &Layer) -> Vec<u8> {
     let mut packet = begin(UPDATE_IMAGE_V3, name);
     packet.extend((layer.names.len() as u32).to_le_bytes());

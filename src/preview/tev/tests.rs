@@ -1,4 +1,4 @@
-//! A listener that reads packets as tev does.
+//! Tests with a listener that reads packets as tev does.
 
 use super::*;
 use crate::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};

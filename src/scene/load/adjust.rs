@@ -1,4 +1,4 @@
-//! What loaders do to a picture's values before anything else sees them.
+//! Changes a picture's values as a loader asks, before anything else sees them.
 
 use super::luminance;
 use super::texture::{Decoded, Values};
@@ -13,7 +13,7 @@ pub(super) struct Adjust {
     pub(super) exponent_bits: u32,
     /// 1 minus so many times the value, no less than 0, as the bits of an f32.
     pub(super) inverted_scale_bits: Option<u32>,
-    /// One number in the place of all three colours.
+    /// Number that takes the place of all three colours, if any.
     pub(super) to_number: Option<Number>,
 }
 
@@ -22,8 +22,8 @@ pub(super) struct Adjust {
 pub(super) enum Number {
     /// The luminance of their colours, as in Mitsuba.
     Luminance,
-    /// Alpha, decoded as the colours are, and where all of it is 1 the mean of R, G and B, as in pbrt-v4 (`MIPMap::Bilerp<Float>`,
-    /// `MIPMap::CreateFromFile`).
+    /// Alpha, decoded as the colours are, and where all of it is 1 the mean of R, G and B, as in pbrt-v4
+    /// (`MIPMap::Bilerp<Float>`, `MIPMap::CreateFromFile`).
     AlphaOrMean,
     /// The mean of R, G and B whatever alpha is, as in pbrt-v4 of pictures whose alpha it drops.
     Mean,

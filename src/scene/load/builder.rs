@@ -33,7 +33,7 @@ pub(super) enum IfDark {
     /// The format has none, or files come without: a studio sky stands in, also when the only emitters are weaker than
     /// `WEAK_EMITTER_CD_M2`.
     Studio,
-    /// The same, but the file's own lights are believed however weak they are.
+    /// A studio sky stands in as by [`Self::Studio`], but the file's own lights are believed however weak they are.
     StudioWithoutLight,
     /// There is light at other times: the picture is black.
     Stay,
@@ -62,7 +62,7 @@ pub(super) struct Builder {
     pub(super) film: FilmDefaults,
     pub(super) viewing: ViewingDefaults,
     pub(super) meshes: Vec<Mesh>,
-    /// Those of `meshes` that have another shape at other times.
+    /// Meshes, of `meshes`, that have another shape at other times.
     pub(super) deforming: HashSet<MeshId>,
     pub(super) instances: Vec<Instance>,
     pub(super) spheres: Vec<Sphere>,
@@ -70,9 +70,10 @@ pub(super) struct Builder {
     pub(super) parts_of_groups: usize,
     pub(super) materials: Vec<Material>,
     pub(super) textures: Requests,
-    /// As [`Scene::bitangent_ignores_v`].
+    /// What becomes [`Scene::bitangent_ignores_v`].
     pub(super) bitangent_ignores_v: bool,
-    /// Whether tangents that the file does not have follow the coordinates at which a normal map is read, not the mesh's own.
+    /// Whether tangents that the file does not have follow the coordinates at which a normal map is read, not the
+    /// mesh's own.
     pub(super) tangents_follow_maps: bool,
     /// Reliefs that only their decoded pictures tell apart.
     pub(super) bumps: Vec<Bump>,
@@ -151,8 +152,8 @@ impl Builder {
         self.alike.add(note.into(), &mut self.notes);
     }
 
-    /// Names the scatterings after which the file ends its paths, unless nothing is left then. In closed rooms what comes after
-    /// them counts: 8 % of veach-ajar's light after 13.
+    /// Names the scatterings after which the file ends its paths, unless nothing is left then. In closed rooms what
+    /// comes after them counts: 8 % of veach-ajar's light after 13.
     pub(super) fn note_depth(&mut self, scatterings: i64) {
         const DEEP: i64 = 100;
         if scatterings >= DEEP {
@@ -259,7 +260,8 @@ impl Builder {
     }
 }
 
-/// Names a shutter that blurs what moves into the frames after it, as pbrt's does for a second where its file says nothing.
+/// Names a shutter that blurs what moves into the frames after it, as pbrt's does for a second where its file says
+/// nothing.
 fn note_long_shutter(scene: &mut Scene, options: &LoadOptions) {
     let shutter_s = scene.shutter_s;
     let is_longer = |frame_s: &f64| shutter_s > 1.001 * frame_s;
@@ -269,8 +271,8 @@ fn note_long_shutter(scene: &mut Scene, options: &LoadOptions) {
     }
 }
 
-/// Gives smooth meshes the tangents that their materials ask for. Of several materials of a mesh that has to follow their maps, the
-/// first one counts; glTF gives each mesh one.
+/// Gives smooth meshes the tangents that their materials ask for. Of several materials of a mesh that has to follow
+/// their maps, the first one counts; glTF gives each mesh one.
 fn add_tangents(scene: &mut Scene, follow_maps: bool) {
     let mut asked: Vec<Option<Option<TextureLookup>>> = vec![None; scene.meshes.len()];
     for instance in &scene.instances {
@@ -287,8 +289,8 @@ fn add_tangents(scene: &mut Scene, follow_maps: bool) {
     });
 }
 
-/// The file as it is at time 0, by which what is to stay for a whole shot is placed: the view of a scene without a camera, and the
-/// studio. `None` where that is now, or always.
+/// The file as it is at time 0, by which what is to stay for a whole shot is placed: the view of a scene without a
+/// camera, and the studio. `None` where that is now, or always.
 fn at_start(read: Option<Read>, path: &Path, options: &LoadOptions) -> Result<Option<Builder>, LoadError> {
     let Some(read) = read.filter(|_| options.frame_time != 0.0) else { return Ok(None) };
     let mut start = read(path, &LoadOptions { frame_time: 0.0, ..options.clone() })?;

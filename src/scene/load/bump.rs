@@ -1,6 +1,7 @@
 //! Bump maps of which only a look at the picture tells whether they hold heights or normals.
 //!
-//! MTL's `map_bump` is a picture of heights, but exporters (Blender's among them) write normal maps under the same name.
+//! MTL's `map_bump` is a picture of heights, but exporters (Blender's among them) write normal maps under the same
+//! name.
 
 use crate::scene::{HeightMap, Material, Relief, Texture};
 

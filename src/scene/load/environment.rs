@@ -25,8 +25,8 @@ pub fn from_file(
     Ok(Environment { scale, from_world: Mat3::from_rotation_y(-rotation_deg.to_radians()), ..environment })
 }
 
-/// A picture in a parametrisation, of scale 1 and not turned. An equal-area picture must be square. `notes` gets a sentence for
-/// whatever was done to its values.
+/// A picture in a parametrisation, of scale 1 and not turned. An equal-area picture must be square. `notes` gets a
+/// sentence for whatever was done to its values.
 ///
 /// # Errors
 /// Where the file cannot be read, or an equal-area picture is not square.

@@ -124,7 +124,7 @@ impl LoadError {
         Self::Unreadable { file: file.to_owned(), problem }
     }
 
-    /// The same error, with the place that named the file.
+    /// This error, with the place that named the file.
     pub fn referenced_from(self, place: Place) -> Self {
         Self::Referenced { place, fault: Box::new(self) }
     }
@@ -172,12 +172,13 @@ pub(crate) fn suggestion<'a>(written: &str, candidates: impl IntoIterator<Item =
     if known.is_empty() { String::new() } else { format!("; known: {}", known.join(", ")) }
 }
 
-/// `unknown texture "wod"; did you mean "wood"?`: of what is written in place of one of these.
+/// The message of what is written in place of one of these: `unknown texture "wod"; did you mean "wood"?`.
 pub(crate) fn unknown<'a>(kind: &str, written: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
     format!("unknown {kind} \"{written}\"{}", suggestion(written, candidates))
 }
 
-/// `there is no medium "fgo"; did you mean "fog"?`: of names that the file itself gives, in whatever order they are held.
+/// The message of a name that is none of those that the file itself gives, in whatever order they are held:
+/// `there is no medium "fgo"; did you mean "fog"?`.
 pub(crate) fn no_such<'a>(kind: impl fmt::Display, name: &str, given: impl Iterator<Item = &'a String>) -> String {
     let mut given: Vec<&str> = given.map(String::as_str).collect();
     given.sort_unstable();

@@ -18,18 +18,19 @@ const MOST_UNPACKED_BYTES: u64 = 2 << 30;
 /// Files that this process has read, by their canonical paths.
 static READ: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Whether this process has read a file as a scene or a part of one: a mesh, a texture, an included file. Writing in its place would lose it.
+/// Whether this process has read a file as a scene or a part of one: a mesh, a texture, an included file. Writing
+/// in its place would lose it.
 pub fn was_read(path: &Path) -> bool {
     let read = READ.lock().unpoisoned();
     path.canonicalize().is_ok_and(|path| read.contains(&path))
 }
 
-/// All files of which [`was_read`] says so.
+/// Lists all files of which [`was_read`] says so.
 pub fn files_read() -> Vec<PathBuf> {
     READ.lock().unpoisoned().iter().cloned().collect()
 }
 
-/// Has [`was_read`] count a file that belongs to a scene and is read elsewhere: the display that it names.
+/// Makes [`was_read`] count a file that belongs to a scene and is read elsewhere: the display that it names.
 pub fn count_as_read(path: &Path) {
     if let Ok(path) = path.canonicalize() {
         READ.lock().unpoisoned().insert(path);

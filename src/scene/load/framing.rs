@@ -11,11 +11,11 @@ pub(super) const LONGEST_SIDE: u32 = 32_768;
 pub(super) enum Framing {
     /// Not beyond what every camera does: without a window its height stays, a window is stretched.
     Fixed,
-    /// As the file states: a film of no other aspect takes it, and a narrower one shows more above and below, so that nothing at its
-    /// sides is lost.
+    /// As the file states: a film of no other aspect takes it, and a narrower one shows more above and below, so that
+    /// nothing at its sides is lost.
     Stated(f32),
-    /// Its window was made for a picture of aspect `film` that is a part of one of aspect `whole`. The axis of the whole keeps what it
-    /// spans, and the window changes with it about the principal point.
+    /// Its window was made for a picture of aspect `film` that is a part of one of aspect `whole`. The axis of the
+    /// whole keeps what it spans, and the window changes with it about the principal point.
     Spanning { axis: FilmAxis, film: f32, whole: f32 },
 }
 
@@ -30,7 +30,7 @@ pub(super) enum FilmAxis {
 }
 
 impl FilmAxis {
-    /// Its length in heights of a film of this aspect.
+    /// Length of the axis in heights of a film of this aspect.
     pub(super) fn length(self, aspect: f32) -> f32 {
         match self {
             Self::X => aspect,

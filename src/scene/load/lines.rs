@@ -1,6 +1,6 @@
 //! Which line a byte of a text is in.
 //!
-//! The starts are found once: counted anew for every value they took 27 s of a TOML file with 8000 spheres.
+//! The starts are found once: counted anew for every value they take 27 s of a TOML file with 8000 spheres.
 
 /// Where the lines of a text begin.
 #[derive(Debug)]

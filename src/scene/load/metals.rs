@@ -2,10 +2,11 @@
 //! `spectrum::named`, which are averaged over whole spectra.
 //!
 //! Read at 630, 532 and 465 nm (red, green and blue of Rec.709-like primaries), linearly between the tabulated
-//! wavelengths of: gold, silver, copper: Johnson and Christy, Phys. Rev. B 6, 4370 (1972); iron, chromium: Johnson and
-//! Christy, Phys. Rev. B 9, 5056 (1974); aluminium: McPeak et al., ACS Photonics 2, 326 (2015). Three wavelengths are
-//! not a spectral render: gold comes out too pale, face on (0.942, 0.704, 0.403) where its reflectance under D65 is
-//! (1.038, 0.728, 0.365), which Rec.709 does not hold. The metals of our scenes, and all that was measured with them, are these.
+//! wavelengths of: gold, silver, copper: Johnson and Christy, Phys. Rev. B 6, 4370 (1972); iron, chromium: Johnson
+//! and Christy, Phys. Rev. B 9, 5056 (1974); aluminium: McPeak et al., ACS Photonics 2, 326 (2015). Three
+//! wavelengths are not a spectral render: gold comes out too pale, face on (0.942, 0.704, 0.403) where its
+//! reflectance under D65 is (1.038, 0.728, 0.365), which Rec.709 does not hold. The metals of our scenes, and all
+//! that was measured with them, are these.
 
 use glam::Vec3;
 

@@ -64,7 +64,8 @@ pub struct LoadOptions {
     pub camera: Option<String>,
     /// Time in seconds at which keyframes are evaluated.
     pub frame_time: f64,
-    /// Seconds for which the shutter stays open from then on where the file's format cannot say (a side file's camera can).
+    /// Seconds for which the shutter stays open from then on where the file's format cannot say (a side file's camera
+    /// can).
     pub shutter_s: f64,
     /// Seconds of a frame, where the scene is one of a shot: a shutter that stays open for longer is noted.
     pub frame_s: Option<f64>,
@@ -74,8 +75,8 @@ pub struct LoadOptions {
     pub on_texture: Option<fn(done: usize, total: usize)>,
     /// Most bytes that decoded textures may take together: beyond it the largest are halved. Surroundings do not count.
     pub texture_memory: Option<u64>,
-    /// Luminance in cd/m² of RGB (1, 1, 1) in place of the file's. What files give in cd/m², lm and lx stays as bright as it is,
-    /// but for the photometric amounts of pbrt's files, which scale with all their other light.
+    /// Luminance in cd/m² of RGB (1, 1, 1) in place of the file's. What files give in cd/m², lm and lx stays as bright
+    /// as it is, but for the photometric amounts of pbrt's files, which scale with all their other light.
     pub nits_per_unit: Option<f64>,
     /// Size of the picture, in place of the file's, for which default views are framed.
     pub film: Option<FilmDefaults>,
@@ -163,7 +164,8 @@ fn check_made_vertices(path: &Path, vertices: usize) -> Result<(), LoadError> {
     ))
 }
 
-/// Refuses files that place things without end: few words can place a large group often, and include a file that includes others.
+/// Refuses files that place things without end: few words can place a large group often, and include a file that
+/// includes others.
 fn check_placed(path: &Path, things: usize) -> Result<(), LoadError> {
     const MOST_THINGS: usize = 4_000_000;
     if things <= MOST_THINGS {
@@ -195,14 +197,15 @@ fn luminance(color: glam::Vec3) -> f32 {
     fechner_perception::photometry::luminance(color.to_array())
 }
 
-/// A number that ends at 0 and 1. A picture times its factor ends there once both are multiplied, so that its factor may be any.
+/// A number that ends at 0 and 1. A picture times its factor ends there once both are multiplied, so that its factor
+/// may be any.
 fn share(input: ScalarInput) -> ScalarInput {
     let most = if input.texture.is_some() { f32::MAX } else { 1.0 };
     ScalarInput { factor: input.factor.clamp(0.0, most), ..input }
 }
 
-/// Linear Rec.709 RGB without negative channels: a colour outside it is mixed with the grey of its own luminance. What is not finite is left to
-/// those who refuse it.
+/// Linear Rec.709 RGB without negative channels: a colour outside it is mixed with the grey of its own luminance. What
+/// is not finite is left to those who refuse it.
 fn within_rec709(color: glam::Vec3) -> glam::Vec3 {
     if color.is_finite() { fechner_perception::tone::gamut::light(color.to_array()).into() } else { color }
 }

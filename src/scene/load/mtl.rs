@@ -1,7 +1,8 @@
-//! MTL files: materials of OBJ meshes, with the PBR extension (Pr, Pm, Pc, Pcr, Ps, aniso, anisor, Ke, their maps, norm) and bump maps.
+//! MTL files: materials of OBJ meshes, with the PBR extension (Pr, Pm, Pc, Pcr, Ps, aniso, anisor, Ke, their
+//! maps, norm) and bump maps.
 //!
-//! Read by ourselves because `tobj`'s reader panics on a colour with fewer than three numbers and leaves texture options
-//! (`map_Kd -s 2 2 1 -o .5 0 0 my wood.png`) unparsed. What files of the wild get wrong is skipped with a note.
+//! Read by ourselves because `tobj`'s reader panics on a colour with fewer than three numbers and leaves texture
+//! options (`map_Kd -s 2 2 1 -o .5 0 0 my wood.png`) unparsed. What files of the wild get wrong is skipped with a note.
 
 mod surface;
 
@@ -288,8 +289,9 @@ impl Written {
         }
     }
 
-    /// `norm` holds normals, `bump` heights unless it looks like normals, `disp` heights. Neither the format nor its readers agree
-    /// on the unit of heights: at a multiplier of 1, white is here a fiftieth of the picture's width above black.
+    /// `norm` holds normals, `bump` heights unless it looks like normals, `disp` heights. Neither the format
+    /// nor its readers agree on the unit of heights: at a multiplier of 1, white is here a fiftieth of the
+    /// picture's width above black.
     fn relief(&self, builder: &mut Builder) -> Option<Relief> {
         const MOST_HEIGHT: f32 = 0.02;
         if let Some(map) = self.map(&["norm"]) {

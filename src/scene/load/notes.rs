@@ -1,4 +1,4 @@
-//! Notes that say the same of many lines, as one.
+//! Notes that say the same of many lines, as one. Not for errors, which end the reading.
 
 use std::collections::{HashMap, HashSet};
 

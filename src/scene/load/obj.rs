@@ -1,8 +1,8 @@
-//! Wavefront OBJ through `tobj`, which is strict about indices and loose about the rest: we clean the text before it and
-//! check what comes out of it.
+//! Wavefront OBJ through `tobj`, which is strict about indices and loose about the rest: we clean the text before it
+//! and check what comes out of it.
 //!
-//! OBJ has neither camera nor lights nor units: see the table in [`super`]. Faces without normals are flat unless they are
-//! in a smoothing group ([`smoothing`]); colours of vertices are taken as sRGB, where every vertex has one.
+//! OBJ has neither camera nor lights nor units: see the table in [`super`]. Faces without normals are flat unless they
+//! are in a smoothing group ([`smoothing`]); colours of vertices are taken as sRGB, where every vertex has one.
 
 mod clean;
 mod libraries;
@@ -37,9 +37,10 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
 pub(super) enum Wanted {
     /// A mesh for each object, group and material, with its material.
     WithMaterials,
-    /// The same without opening its MTL files.
+    /// The meshes, without opening the MTL files.
     Meshes,
-    /// As Mitsuba reads it: objects, groups, materials and smoothing groups mean nothing. (Still a mesh for each pattern of faces.)
+    /// The meshes as Mitsuba reads them: objects, groups, materials and smoothing groups mean nothing. (Still a mesh
+    /// for each pattern of faces.)
     Undivided,
 }
 

@@ -13,7 +13,7 @@ const MOST_CORNERS_TO_CLIP: usize = 50_000;
 pub(super) enum Covering {
     /// Once, wherever it does not cross itself.
     Exact,
-    /// By a fan, although a corner points inwards: there are more than [`MOST_CORNERS_TO_CLIP`].
+    /// Covered by a fan, although a corner points inwards: there are more than [`MOST_CORNERS_TO_CLIP`].
     RoughFan,
 }
 

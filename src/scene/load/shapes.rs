@@ -1,4 +1,4 @@
-//! Meshes of the simple shapes that scene files name.
+//! Meshes of the simple shapes that scene files name. A sphere is among them only where a transform has squeezed it.
 
 use crate::scene::Mesh;
 use glam::{Affine3A, Vec2, Vec3};
@@ -60,8 +60,8 @@ pub fn disk(center: Vec3, normal: Vec3, radius: f32) -> Mesh {
     mesh
 }
 
-/// The disk around the origin that faces +z, its texture coordinates by the distance from the middle as a share of the radius
-/// and by the turn from +x in [0, 1]. Each triangle has a middle of its own, since that lies at every turn.
+/// The disk around the origin that faces +z, its texture coordinates by the distance from the middle as a share of the
+/// radius and by the turn from +x in [0, 1]. Each triangle has a middle of its own, since that lies at every turn.
 pub(super) fn polar_disk(radius: f32, uv: impl Fn(f32, f32) -> Vec2) -> Mesh {
     let mut mesh = Mesh { name: "disk".to_owned(), ..Mesh::default() };
     for segment in 0..=DISK_SEGMENTS {

@@ -1,15 +1,15 @@
 //! A clear sky with its sun, in cd/m² and lx, from the sun's place and the haze.
 //!
-//! Sky: Preetham, Shirley and Smits, "A Practical Analytic Model for Daylight", 1999. Not for a sun below the horizon, nor
-//! for turbidities outside [2, 10], for which the model was not fitted. Sun: the solar disc through the air masses and
-//! optical depths of the same paper's appendix (Rayleigh and aerosol; ozone, gases and water vapour are left out: below
-//! 5 % of illuminance at an air mass of 1).
+//! Sky: Preetham, Shirley and Smits, "A Practical Analytic Model for Daylight", 1999. Not for a sun below the horizon,
+//! nor for turbidities outside [2, 10], for which the model was not fitted. Sun: the solar disc through the air masses
+//! and optical depths of the same paper's appendix (Rayleigh and aerosol; ozone, gases and water vapour are left out:
+//! below 5 % of illuminance at an air mass of 1).
 //!
-//! Limits of the sky. It is too bright, above all while the sun is low: on level ground at turbidity 3 it gives, at sun elevations
-//! of 0°, 3°, 10° and 60°, 11, 2.5, 2.0 and 2.1 times the illuminance that handbooks give for a clear sky (IES RP-21: 0.8 + 15.5 √sin h
-//! klx; `cargo test --lib brighter_than_handbooks -- --nocapture`), so that there is no dusk. Near the horizon it depends on turbidity
-//! more than real skies do: at 2 the horizon opposite a sun at 10° is about three times as bright as at 3. Below a sixteenth of a degree of elevation
-//! it is that of this elevation.
+//! Limits of the sky. It is too bright, above all while the sun is low: on level ground at turbidity 3 it gives, at sun
+//! elevations of 0°, 3°, 10° and 60°, 11, 2.5, 2.0 and 2.1 times the illuminance that handbooks give for a clear sky
+//! (IES RP-21: 0.8 + 15.5 √sin h klx; `cargo test --lib brighter_than_handbooks -- --nocapture`), so that there is no
+//! dusk. Near the horizon it depends on turbidity more than real skies do: at 2 the horizon opposite a sun at 10° is
+//! about three times as bright as at 3. Below a sixteenth of a degree of elevation it is that of this elevation.
 
 use super::within_rec709;
 use crate::scene::{Environment, Light};
@@ -57,8 +57,8 @@ pub struct SkyLight {
 
 /// Half angle of the solar disc in radians, at the mean distance.
 const SUN_ANGULAR_RADIUS: f32 = 0.004_65;
-/// Illuminance of the sun outside the atmosphere in lx (133 klx: Darula, Kittler and Gueymard, "Reference Luminous Solar
-/// Constant and Solar Luminance for Illuminance Calculations", 2005).
+/// Illuminance of the sun outside the atmosphere in lx (133 klx: Darula, Kittler and Gueymard, "Reference Luminous
+/// Solar Constant and Solar Luminance for Illuminance Calculations", 2005).
 const SOLAR_ILLUMINANCE_LX: f64 = 133_300.0;
 /// Columns and rows of the sky's picture: the glow around the sun is degrees wide.
 const SIZE: [u32; 2] = [512, 256];

@@ -1,9 +1,9 @@
-//! Tangents of smooth meshes that come without: from one triangle to the next they turn with the normals, so that a normal map or a
-//! brushed metal shows no edges between them.
+//! Tangents of smooth meshes that come without: from one triangle to the next they turn with the normals, so that a
+//! normal map or a brushed metal shows no edges between them.
 //!
-//! At each vertex the directions of growing u of the triangles around are averaged by their angles there, in the plane of its normal,
-//! as normal maps are commonly made for. Triangles whose picture is mirrored are averaged apart. Flat meshes need none: what a
-//! triangle says of itself is all there is.
+//! At each vertex the directions of growing u of the triangles around are averaged by their angles there, in the plane
+//! of its normal, as normal maps are commonly made for. Triangles whose picture is mirrored are averaged apart. Flat
+//! meshes need none: what a triangle says of itself is all there is.
 
 use super::shapes;
 use crate::scene::pictured_edges::PicturedEdges;
@@ -14,15 +14,17 @@ use std::collections::HashMap;
 /// What corners have that share a tangent: place, normal, coordinates, and whether the picture is mirrored.
 type Key = ([u32; 8], bool);
 
-/// Gives a mesh tangents, if it has normals and coordinates and no tangents. A vertex where mirrored and other triangles meet becomes two.
+/// Gives a mesh tangents, if it has normals and coordinates and no tangents. A vertex where mirrored and other
+/// triangles meet becomes two.
 pub(super) fn add(mesh: &mut Mesh) {
     if !mesh.normals.is_empty() {
         add_along(mesh, |uv| uv);
     }
 }
 
-/// The same by the coordinates at which a picture is read: glTF's tangents follow the normal map where the file has none. By the mesh's
-/// own, normals of a map that is turned by half a turn were lit from the opposite side.
+/// Gives a mesh tangents, as [`add`] does, by the coordinates at which a picture is read: glTF's tangents follow
+/// the normal map where the file has none. By the mesh's own, normals of a map that is turned by half a turn are
+/// lit from the opposite side.
 pub(super) fn add_for(mesh: &mut Mesh, picture: &TextureLookup) {
     if picture.rotation == 0.0 && picture.scale.min_element() >= 0.0 {
         return add(mesh);
@@ -62,8 +64,8 @@ fn add_along(mesh: &mut Mesh, on_picture: impl Fn(Vec2) -> Vec2) {
     mesh.tangents = tangents;
 }
 
-/// For each vertex the number of those that share its tangent, and how many numbers there are. Vertices of mirrored triangles have no
-/// others ([`split_mirrored`]); those that no triangle uses count as not mirrored.
+/// For each vertex the number of those that share its tangent, and how many numbers there are. Vertices of mirrored
+/// triangles have no others ([`split_mirrored`]); those that no triangle uses count as not mirrored.
 fn groups(mesh: &Mesh, mirrored: &[bool]) -> (Vec<usize>, usize) {
     let mut is_mirrored = vec![false; mesh.positions.len()];
     for (triangle, _) in mesh.triangles.iter().zip(mirrored).filter(|(_, mirrored)| **mirrored) {

@@ -1,4 +1,5 @@
-//! Textures that loaders ask for while they read their file: everything is decoded at the end, in parallel, each picture once.
+//! Textures that loaders ask for while they read their file: everything is decoded at the end, in parallel, each
+//! picture once.
 
 mod decode;
 
@@ -29,8 +30,8 @@ pub(super) enum Picture {
     Texels { name: String, size: [u32; 2], bits: Arc<Vec<[u32; 4]>> },
 }
 
-/// What to do when the file is not there at all, or of a kind that is not read, and the place that names it. (A damaged one is always an
-/// error.)
+/// What to do when the file is not there at all, or of a kind that is not read, and the place that names it. (A
+/// damaged one is always an error.)
 #[derive(Clone, Debug)]
 pub(super) enum IfMissing {
     /// An error.
@@ -65,8 +66,8 @@ impl Request {
         }
     }
 
-    /// The same number for the same wish. Of bytes in memory only the name counts: to hash megabytes for each material that reads them
-    /// would take longer than the comparison, which ends where both are the same allocation.
+    /// The same number for the same wish. Of bytes in memory only the name counts: to hash megabytes for each material
+    /// that reads them would take longer than the comparison, which ends where both are the same allocation.
     fn likeness(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         match &self.picture {
@@ -120,7 +121,7 @@ impl Requests {
         TextureId(place as u32)
     }
 
-    /// The same picture with its values raised to a power, as a texture of its own.
+    /// The place of the same picture with its values raised to a power, as a texture of its own.
     pub(super) fn raised(&mut self, texture: TextureId, exponent: f32) -> TextureId {
         let mut request = self.requests[texture.0 as usize].clone();
         request.adjust.exponent_bits = (f32::from_bits(request.adjust.exponent_bits) * exponent).to_bits();
@@ -150,8 +151,8 @@ impl Requests {
         Ok(request.texture(slot.take_for(request, &mut Vec::new())?))
     }
 
-    /// Decodes everything. `notes` gets a sentence for each missing file that was replaced, and one of what was made smaller.
-    /// `coverage` are the textures whose alpha is how much of the surface is there.
+    /// Decodes everything. `notes` gets a sentence for each missing file that was replaced, and one of what was made
+    /// smaller. `coverage` are the textures whose alpha is how much of the surface is there.
     pub(super) fn decode(
         self,
         notes: &mut Vec<String>,
@@ -185,7 +186,8 @@ impl Requests {
         Distinct { wanted, place_of }
     }
 
-    /// The pictures whose alpha is coverage in any of their uses: a colour and its coverage may be read with different encodings.
+    /// The pictures whose alpha is coverage in any of their uses: a colour and its coverage may be read with different
+    /// encodings.
     fn covering(&self, coverage: &HashSet<TextureId>) -> HashSet<&Picture> {
         let ids = (0..).map(TextureId);
         let covers = self.requests.iter().zip(ids).filter(|(_, id)| coverage.contains(id));
@@ -199,7 +201,7 @@ type Wanted<'a> = (&'a Picture, Encoding, Adjust);
 /// What requests come to once none is done twice.
 struct Distinct<'a> {
     wanted: Vec<Wanted<'a>>,
-    /// Of each request, its place in `wanted`.
+    /// Place of each request in `wanted`.
     place_of: Vec<usize>,
 }
 

@@ -1,8 +1,9 @@
 //! Textures within a limit of memory: the largest are halved until all fit.
 //!
-//! A picture is averaged over the area of each new texel, in one go and in linear light, so that it stays as bright as it was.
-//! What it loses is detail, also where the camera is near. Normal maps are averaged as vectors and stay shorter than 1 where normals
-//! differ: shading makes them unit length after its own interpolation, in which disagreeing texels should count less.
+//! A picture is averaged over the area of each new texel, in one go and in linear light, so that it stays as bright as
+//! it was. What it loses is detail, also where the camera is near. Normal maps are averaged as vectors and stay
+//! shorter than 1 where normals differ: shading makes them unit length after its own interpolation, in which
+//! disagreeing texels should count less.
 
 use super::texture::Decoded;
 use crate::scene::{Encoding, Texels};
@@ -29,8 +30,8 @@ pub(super) fn halved(side: u32, halvings: u32) -> u32 {
     u64::from(side).div_ceil(1 << halvings.min(32)).max(1) as u32
 }
 
-/// How often each picture is halved so that together they take at most `limit` bytes: always the one that takes most, of equals the
-/// first. Less than a texel is left of none, so that a limit may be missed.
+/// How often each picture is halved so that together they take at most `limit` bytes: always the one that takes most,
+/// of equals the first. Less than a texel is left of none, so that a limit may be missed.
 pub(super) fn halvings(extents: &[Extent], limit: u64) -> Vec<u32> {
     let mut halvings = vec![0; extents.len()];
     let mut total: u64 = extents.iter().map(|extent| extent.bytes(0)).sum();
@@ -51,7 +52,7 @@ pub(super) fn halvings(extents: &[Extent], limit: u64) -> Vec<u32> {
 /// What the fourth channel says of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Alpha {
-    /// It is a value among others, or nobody reads it.
+    /// Alpha is a value among others, or nobody reads it.
     Independent,
     /// How much of the colour is there: what is not there must not colour the mean.
     Coverage,

@@ -66,8 +66,9 @@ fn has_triangles(builder: &Builder, instance: &Instance) -> bool {
     !builder.meshes[instance.mesh.0 as usize].triangles.is_empty()
 }
 
-/// Takes out of the scene what no ray can meet. What a transform flattens keeps its place, with a mesh of nothing: at other times it
-/// may be there (glTF's way to hide a thing is a scale of 0), and whatever comes after it is to have one number all through a shot.
+/// Takes out of the scene what no ray can meet. What a transform flattens keeps its place, with a mesh of nothing: at
+/// other times it may be there (glTF's way to hide a thing is a scale of 0), and whatever comes after it is to have one
+/// number all through a shot.
 fn hide_unseen(builder: &mut Builder) {
     let mut notes = Vec::new();
     let meshes = &builder.meshes;

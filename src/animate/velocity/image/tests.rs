@@ -125,8 +125,8 @@ fn mark(tracer: &PathTracer, hit: &Hit) -> Option<Vec3> {
         .map(|point| scene.instances[0].to_world.inverse().transform_point3(point))
 }
 
-/// Where the first square is seen over mirrors or glass in both frames, the map leads to the same mark on it; the share of the
-/// pixels that show it so for which that holds, and how many they are.
+/// Where the first square is seen over mirrors or glass in both frames, the map leads to the same mark on it; the share
+/// of the pixels that show it so for which that holds, and how many they are.
 fn same_marks(tracers: &[PathTracer; 3], scale: f32) -> (f64, u32) {
     let [previous, now, next] = tracers;
     let (map, now) = (map_of(tracers), Moment::of(now));

@@ -16,8 +16,8 @@ use std::path::Path;
 use std::time::Instant;
 
 impl Shot<'_> {
-    /// The track that lies beside the frames, if it is of this shot and the scenes of all `wanted` frames are still those that
-    /// it was made from; else a new one.
+    /// The track that lies beside the frames, if it is of this shot and the scenes of all `wanted` frames are still
+    /// those that it was made from; else a new one.
     pub(in crate::cli) fn track(&self, wanted: RangeInclusive<u32>) -> Result<Track> {
         let file = self.track_file();
         let operator = self.operator()?;
@@ -47,8 +47,8 @@ impl Shot<'_> {
         Ok(track)
     }
 
-    /// Reads the scenes beyond both ends, which the first and the last frame alone need: else a shot would fail at its last frame, when
-    /// all others are rendered.
+    /// Reads the scenes beyond both ends, which the first and the last frame alone need: else a shot would fail at its
+    /// last frame, when all others are rendered.
     fn check_ends(&self) -> Result<()> {
         let [first, last] = [self.settings.first, self.settings.last].map(f64::from);
         for (beyond, end) in [(first - 1.0, "first"), (last + 1.0, "last")] {

@@ -162,9 +162,9 @@ struct Place {
 }
 
 impl Place {
-    /// Which keys are past is told by f32 times, as files hold them: frame n's own key lies after n / fps by f32 rounding in 34 of
-    /// 100 frames at 24 a second and in 53 at 30, and a STEP would come a frame late. How far past is told by f64: after 28 hours f32
-    /// times are a fifth of a frame apart.
+    /// Which keys are past is told by f32 times, as files hold them: frame n's own key lies after n / fps by f32
+    /// rounding in 34 of 100 frames at 24 a second and in 53 at 30, and a STEP would come a frame late. How far past is
+    /// told by f64: after 28 hours f32 times are a fifth of a frame apart.
     fn of(times: &[f32], time: f64) -> Self {
         let after = times.partition_point(|&key| key <= time as f32);
         let (before, after) = (after.saturating_sub(1), after.min(times.len() - 1));

@@ -1,5 +1,5 @@
-//! Containers and bytes of glTF: GLB chunks, buffers from files and `data:` URIs, accessors. Every range is checked here;
-//! the `gltf` crate's own readers trust the file and panic on damaged ones.
+//! Containers and bytes of glTF: GLB chunks, buffers from files and `data:` URIs, accessors. Every range is checked
+//! here; the `gltf` crate's own readers trust the file and panic on damaged ones.
 
 use super::super::error::LoadError;
 use super::super::files;
@@ -158,7 +158,8 @@ impl Buffers {
         self.elements(accessor, decode)
     }
 
-    /// The same of an attribute of a mesh, which has one element for each vertex (glTF 2.0, 3.7.2.1).
+    /// Elements, as [`Self::floats`] reads them, of an attribute of a mesh, which has one element for each
+    /// vertex (glTF 2.0, 3.7.2.1).
     pub(super) fn of_vertices<const N: usize>(
         &self,
         accessor: &gltf::Accessor,

@@ -1,4 +1,5 @@
-//! The JSON part of a glTF file, checked: its extensions, and what the crate's own checks leave out or are too strict about.
+//! The JSON part of a glTF file, checked: its extensions, and what the crate's own checks leave out or are too strict
+//! about.
 
 use super::super::builder::Builder;
 use super::super::error::{LoadError, Place};
@@ -72,8 +73,8 @@ pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<:
     Ok(::gltf::Document::from_json_without_validation(root))
 }
 
-/// The JSON's content. Where the crate misses something, once more without the animation's channels that name no node: they move
-/// nothing, and the crate wants one.
+/// The JSON's content. Where the crate misses something, once more without the animation's channels that name no node:
+/// they move nothing, and the crate wants one.
 fn read(json: &[u8]) -> serde_json::Result<Root> {
     serde_json::from_slice(json).or_else(|error| {
         let Ok(mut value) = serde_json::from_slice::<Value>(json) else { return Err(error) };
@@ -87,7 +88,8 @@ fn read(json: &[u8]) -> serde_json::Result<Root> {
     })
 }
 
-/// What the crate finds wrong, but for what the format allows: accessors of zeros, which have no bytes, and textures without an image.
+/// What the crate finds wrong, but for what the format allows: accessors of zeros, which have no bytes, and
+/// textures without an image.
 fn check_by_crate(path: &Path, root: &Root) -> Result<(), LoadError> {
     let mut errors = Vec::new();
     root.validate(root, ::gltf::json::Path::new, &mut |place, error| {
@@ -145,8 +147,8 @@ fn check_positions(path: &Path, root: &Root) -> Result<(), LoadError> {
     Ok(())
 }
 
-/// Refuses animations of a node or property that does not exist: the crate's validation looks at neither, and its reader
-/// panics (gltf-json 1.4.1, found by damaging a file).
+/// Refuses animations of a node or property that does not exist: the crate's validation looks at neither, and its
+/// reader panics (gltf-json 1.4.1, found by damaging a file).
 fn check_animations(path: &Path, root: &Root) -> Result<(), LoadError> {
     for (number, animation) in root.animations.iter().enumerate() {
         for target in animation.channels.iter().map(|channel| &channel.target) {

@@ -1,4 +1,5 @@
-//! Extensions of glTF's materials that the `gltf` crate leaves as JSON: what they say, by keys and types that are checked.
+//! Extensions of glTF's materials that the `gltf` crate leaves as JSON: what they say, by keys and types that are
+//! checked.
 
 use super::super::builder::Builder;
 use super::super::error::{LoadError, suggestion};
@@ -40,7 +41,7 @@ pub(super) struct Extension<'a> {
 }
 
 impl<'a> Extension<'a> {
-    /// `None` where the material does not have it. Keys that it does not know are noted.
+    /// The extension of a material; `None` where that does not have it. Keys that it does not know are noted.
     pub(super) fn of(
         path: &'a Path,
         builder: &mut Builder,

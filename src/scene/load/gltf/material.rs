@@ -1,4 +1,4 @@
-//! glTF materials.
+//! Reads glTF materials.
 
 use super::super::builder::Builder;
 use super::super::error::LoadError;
@@ -169,7 +169,8 @@ impl<'a> Materials<'a> {
         Ok(map.map(|map| Relief::Normals { map, strength: if strength.is_finite() { strength } else { 1.0 } }))
     }
 
-    /// The direction of KHR_materials_anisotropy: red and green of its texture, whose blue is the strength, and its rotation.
+    /// The direction of KHR_materials_anisotropy: red and green of its texture, whose blue is the strength, and its
+    /// rotation.
     fn stretch(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<Option<StretchDirection>, LoadError> {
         let Some(anisotropy) = Extension::of(self.path, builder, from, &ANISOTROPY)? else { return Ok(None) };
         let rotation = anisotropy.number("anisotropyRotation")?;

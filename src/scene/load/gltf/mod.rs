@@ -1,8 +1,8 @@
 //! glTF 2.0 and GLB through the `gltf` crate's document, with buffers, accessors and images read by ourselves (see
 //! [`buffers`]): its readers panic on damaged files.
 //!
-//! The first animation is played up to the time that the caller asks for; skins and morph targets bend the meshes of that
-//! moment. While the shutter is open nodes and cameras go on, and the shapes of that moment with them.
+//! The first animation is played up to the time that the caller asks for; skins and morph targets bend the meshes of
+//! that moment. While the shutter is open nodes and cameras go on, and the shapes of that moment with them.
 
 mod animation;
 mod buffers;

@@ -1,5 +1,5 @@
-//! Nodes while the shutter is open: the animation's poses at several moments, and the motion through them. Not for skins, nor for the
-//! shapes of morph targets, which keep the form they have when it opens.
+//! Nodes while the shutter is open: the animation's poses at several moments, and the motion through them. Not for
+//! skins, nor for the shapes of morph targets, which keep the form they have when it opens.
 
 use super::super::Shutter;
 use super::super::error::LoadError;
@@ -13,7 +13,8 @@ use std::path::Path;
 const STEPS: u32 = 8;
 /// Keys inside the shutter that are met exactly; a shutter rarely holds one.
 const MOST_KEYS: usize = 64;
-/// Size of what is hidden by a scale of 0, as share of its own: small beyond any pixel, and still a transform that can be undone.
+/// Size of what is hidden by a scale of 0, as share of its own: small beyond any pixel, and still a transform that can
+/// be undone.
 const SPECK: f32 = 1e-4;
 
 /// The pose of all animated nodes at a moment of the open shutter.
@@ -23,7 +24,8 @@ pub(super) struct Moment {
     pub(super) pose: animation::Pose,
 }
 
-/// The moments of a shutter in order, the first when it opens; that one alone where nothing is animated or it does not stay open.
+/// The moments of a shutter in order, the first when it opens; that one alone where nothing is animated or it does not
+/// stay open.
 pub(super) fn moments(
     path: &Path,
     document: &gltf::Document,
@@ -44,8 +46,8 @@ pub(super) fn moments(
     times.into_iter().map(moment).collect()
 }
 
-/// Shares of the shutter and times of the keys inside it, and just before those that jump: else the jump would be smeared from the
-/// moment before.
+/// Shares of the shutter and times of the keys inside it, and just before those that jump: else the jump would be
+/// smeared from the moment before.
 fn at_keys(mut keys: Vec<KeyTime>, shutter: Shutter) -> Vec<(f32, f64)> {
     // By f32 times, as poses are found: a key that f32 rounding puts after the opening is met there.
     let (opens, closes) = (shutter.opens as f32, (shutter.opens + shutter.stays_open) as f32);
@@ -68,8 +70,9 @@ fn at_keys(mut keys: Vec<KeyTime>, shutter: Shutter) -> Vec<(f32, f64)> {
     times
 }
 
-/// The motion through a node's transforms at those moments; `None` where it rests or is flat all the time. While it is flat, which is
-/// how files hide a thing, it is a speck: what is there for a part of the shutter blurs and covers for that part.
+/// The motion through a node's transforms at those moments; `None` where it rests or is flat all the time.
+/// While it is flat, which is how files hide a thing, it is a speck: what is there for a part of the shutter
+/// blurs and covers for that part.
 pub(super) fn through(moments: &[Moment], transforms: &[Mat4]) -> Option<Motion> {
     if transforms.windows(2).all(|pair| pair[0] == pair[1]) {
         return None;
@@ -90,7 +93,8 @@ pub(super) fn through(moments: &[Moment], transforms: &[Mat4]) -> Option<Motion>
     Motion::new(Affine3A::IDENTITY, moments.iter().zip(transforms).map(key).collect())
 }
 
-/// The same of a camera, whose scale changes nothing: from where it is when the shutter opens.
+/// The motion of a camera through a node's transforms at those moments, from where it is when the shutter opens; its
+/// scale changes nothing. `None` as by [`through`].
 pub(super) fn of_camera(moments: &[Moment], transforms: &[Mat4]) -> Option<Motion> {
     let whole = through(moments, transforms)?;
     let rigid = |key: &MotionKey| MotionKey { pose: Pose { stretch: Mat3A::IDENTITY, ..key.pose }, ..*key };

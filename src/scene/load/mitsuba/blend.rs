@@ -19,7 +19,7 @@ impl Look {
         Self { surface: self.surface.clone(), relief: self.relief, alpha: alpha_of(coverage) }
     }
 
-    /// With an opacity over what is there of it already; `None` where it takes two pictures.
+    /// This look with an opacity over what is there of it already; `None` where that takes two pictures.
     pub(super) fn masked(&self, opacity: ScalarInput) -> Option<Self> {
         product(self.coverage(), opacity).map(|coverage| self.covering(coverage))
     }

@@ -1,4 +1,5 @@
-//! `<bsdf>` and its wrappers.
+//! Reads `<bsdf>` and its wrappers: blends, masks, bumps, coatings, two sides. BSDFs that wrap no other are left to
+//! `surfaces`.
 
 use super::super::error::{LoadError, names_of};
 use super::colors::{Meaning, number_of};
@@ -31,7 +32,7 @@ const WRAPPERS: &[(&str, Wrapper)] = &[
 
 /// What a BSDF comes to: the surface, and what its wrappers add.
 pub(super) struct Look {
-    /// `None` for a surface that is not there.
+    /// What the BSDF is; `None` for a surface that is not there.
     pub(super) surface: Option<Surface>,
     pub(super) alpha: Alpha,
     pub(super) relief: Option<Relief>,

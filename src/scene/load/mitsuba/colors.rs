@@ -31,7 +31,7 @@ impl Reader {
         self.nested_color(owner, name, meaning, 0)
     }
 
-    /// The same inside so many textures.
+    /// A colour without texture that is read inside so many textures.
     pub(super) fn nested_color(
         &mut self,
         owner: &Element,
@@ -57,7 +57,7 @@ impl Reader {
         self.nested_input(owner, name, meaning, 0)
     }
 
-    /// The same inside so many textures.
+    /// A colour that may be a texture, read inside so many textures.
     fn nested_input(
         &mut self,
         owner: &Element,

@@ -1,7 +1,7 @@
 //! The XML of a Mitsuba scene as a tree of our own: includes followed, `$name` replaced, dialects made one.
 //!
-//! The dialects differ in the spelling of names only (`toWorld`, `to_world`): names are compared without underscores and
-//! in lower case.
+//! The dialects differ in the spelling of names only (`toWorld`, `to_world`): names are compared without
+//! underscores and in lower case.
 
 use super::super::error::{LoadError, Place};
 use super::super::files;
@@ -17,7 +17,7 @@ const DEEPEST: usize = 64;
 /// Most elements of a document, and of all that it includes.
 const MOST_NODES: u32 = 4_000_000;
 
-/// Most bytes of a text after its `$name` were replaced: values that hold values grow without bounds.
+/// Most bytes of a text whose `$name` are replaced: values that hold values grow without bounds.
 const LONGEST_VALUE: usize = 1 << 12;
 
 /// An element.
@@ -220,12 +220,12 @@ impl Element {
         self.attribute(name).ok_or_else(|| self.error(format_args!("the attribute \"{name}\" is missing")))
     }
 
-    /// Its plugin, in the spelling for comparison.
+    /// Plugin of the element, in the spelling for comparison.
     pub(super) fn kind(&self) -> String {
         canonical(self.attribute("type").unwrap_or(""))
     }
 
-    /// Its id, else its plugin.
+    /// Id of the element, else its plugin.
     pub(super) fn name(&self) -> String {
         self.attribute("id").or(self.attribute("type")).unwrap_or(&self.tag).to_owned()
     }

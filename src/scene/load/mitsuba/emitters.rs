@@ -1,4 +1,4 @@
-//! `<emitter>`: lights, surroundings, and the radiance of surfaces.
+//! Reads `<emitter>`: lights, surroundings, and the radiance of surfaces.
 
 use super::super::environment;
 use super::super::error::{LoadError, names_of};

@@ -1,7 +1,7 @@
 //! Mitsuba scene files (XML, dialects 0.4 to 3), as far as scenes/README.md lists.
 //!
-//! RGB as it stands, tables of spectra through the CIE observer. One-sided BSDFs scatter on both sides here. Integrators,
-//! samplers and reconstruction filters are fechner's.
+//! RGB as it stands, tables of spectra through the CIE observer. One-sided BSDFs scatter on both sides here.
+//! Integrators, samplers and reconstruction filters are fechner's.
 
 mod blend;
 mod bsdfs;
@@ -87,7 +87,7 @@ struct Reader {
     /// Parts of groups, by address.
     groups: HashMap<*const Element, Vec<(MeshId, MaterialId, Affine3A)>>,
     current_group: Option<Vec<(MeshId, MaterialId, Affine3A)>>,
-    /// Of meshes that stand for disks and their like.
+    /// Vertices of meshes that stand for disks and their like.
     made_vertices: usize,
     /// Whether the file is of version 2 or later: other defaults, and skies with their zenith along +z.
     since_2: bool,
@@ -163,7 +163,8 @@ impl Reader {
         })
     }
 
-    /// A file that an element names: in a folder of `<path>`, beside the file that it stands in, or beside the first one.
+    /// A file that an element names: in a folder of `<path>`, beside the file that it stands in, or beside the first
+    /// one.
     fn file(&self, element: &Element, name: &str) -> Result<PathBuf, LoadError> {
         self.given.find(name, &[element.file.as_path(), &self.main], element.place())
     }

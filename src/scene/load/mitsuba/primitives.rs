@@ -1,5 +1,5 @@
-//! The shapes that need no file, with Mitsuba's own texture coordinates: v = 0 is the top row of a picture wherever that
-//! comes to lie.
+//! The shapes that need no file, with Mitsuba's own texture coordinates: v = 0 is the top row of a picture
+//! wherever that comes to lie.
 
 use super::super::shapes;
 use crate::scene::Mesh;
@@ -42,7 +42,8 @@ pub(super) fn disk() -> Mesh {
     shapes::polar_disk(1.0, Vec2::new)
 }
 
-/// Without caps, seen from outside: u is the turn, v the way along the axis. `None` if the ends are one point.
+/// A cylinder without caps, seen from outside: u is the turn, v the way along the axis. `None` if the ends are one
+/// point.
 pub(super) fn cylinder(from: Vec3, to: Vec3, radius: f32) -> Option<Mesh> {
     let axis = (to - from).try_normalize()?;
     let (x, y) = axis.any_orthonormal_pair();

@@ -49,8 +49,8 @@ impl Reader {
         Ok(share(self.scalar_input(bsdf, name)?.unwrap_or(ScalarInput::constant(default))))
     }
 
-    /// What goes through is tinted by √base_color at each crossing, so by base_color through a whole body: glTF's model tints each
-    /// by all of it, and a ball of base colour 0.25 let through 0.0625 of the light.
+    /// What goes through is tinted by √base_color at each crossing, so by base_color through a whole body: glTF's model
+    /// tints each by all of it, and a ball of base colour 0.25 let through 0.0625 of the light.
     fn glass(&mut self, bsdf: &Element, model: MetalRoughness) -> Surface {
         let Some(amount) = share_of_glass(model.transmission, model.metallic) else {
             self.builder.note(format!(
@@ -83,7 +83,8 @@ impl Reader {
     }
 }
 
-/// `transmission` · (1 − `metallic`), where one picture is enough for it and is nowhere cut at 1 before metal takes its share.
+/// `transmission` · (1 − `metallic`), where one picture is enough for it and is nowhere cut at 1 before metal takes its
+/// share.
 fn share_of_glass(transmission: ScalarInput, metallic: ScalarInput) -> Option<ScalarInput> {
     let is_cut = transmission.texture.is_some() && transmission.factor > 1.0;
     if metallic.factor > 0.0 && (metallic.texture.is_some() || is_cut) {

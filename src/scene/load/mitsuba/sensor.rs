@@ -1,4 +1,4 @@
-//! `<sensor>` and its `<film>`.
+//! Reads `<sensor>` and its `<film>`.
 
 use super::super::builder::NamedCamera;
 use super::super::default_view;
@@ -13,7 +13,8 @@ use glam::{Affine3A, Vec2, Vec3};
 /// Mitsuba's default.
 const FAR_CLIP: f32 = 1e4;
 
-/// Depths along a camera's axis before and behind which Mitsuba shows nothing, in scene units, where the file gives them.
+/// Depths along a camera's axis before and behind which Mitsuba shows nothing, in scene units, where the file gives
+/// them.
 pub(super) struct Clips {
     place: Place,
     /// Mitsuba's default of 0.01 leaves out nothing that anyone would look for.

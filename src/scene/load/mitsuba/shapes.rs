@@ -1,4 +1,4 @@
-//! `<shape>`.
+//! Reads `<shape>`. What a shape is made of is left to `bsdfs`.
 
 use super::super::error::LoadError;
 use super::super::{obj, ply, shapes};

@@ -1,4 +1,4 @@
-//! BSDFs that wrap no other: what each comes to here.
+//! Reads BSDFs that wrap no other: what each comes to here.
 
 use super::super::error::LoadError;
 use super::super::spectrum::named;
@@ -180,7 +180,7 @@ impl Reader {
         Ok(Surface::Conductor { eta: (eta / outside).max(Vec3::splat(1e-4)), k: k / outside, tint, roughness })
     }
 
-    /// Of a BSDF that comes smooth and, as "rough...", rough.
+    /// Roughness of a BSDF that comes smooth and, as "rough...", rough.
     pub(super) fn roughness_of_kind(&mut self, bsdf: &Element) -> Result<Roughness, LoadError> {
         if is_rough(bsdf) { self.roughness(bsdf) } else { Ok(Roughness::SMOOTH) }
     }
@@ -206,8 +206,9 @@ fn is_rough(bsdf: &Element) -> bool {
     bsdf.kind().starts_with("rough")
 }
 
-/// Our roughness for the `alpha` of `roughdiffuse`: the ratio B/A of Oren and Nayar's lobes for slopes of a standard deviation
-/// of α/√2 radians, as Mitsuba 0.6 has them. A picture is taken in proportion to what its brightest is, within 0.03.
+/// Our roughness for the `alpha` of `roughdiffuse`: the ratio B/A of Oren and Nayar's lobes for slopes of a
+/// standard deviation of α/√2 radians, as Mitsuba 0.6 has them. A picture is taken in proportion to what its
+/// brightest is, within 0.03.
 fn grooves(alpha: ScalarInput) -> ScalarInput {
     let variance = 0.5 * alpha.factor * alpha.factor;
     let flat = 1.0 - 0.5 * variance / (variance + 0.33);

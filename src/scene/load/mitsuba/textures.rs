@@ -1,4 +1,4 @@
-//! `<texture>`.
+//! Reads `<texture>`. Pictures are noted here and decoded when the whole scene is read.
 
 use super::super::error::LoadError;
 use super::super::texture::{Adjust, IfMissing, Number, Picture, Request, has_alpha, is_grey};
@@ -22,8 +22,8 @@ pub(super) fn check_depth(user: &Element, depth: usize) -> Result<(), LoadError>
 }
 
 impl Reader {
-    /// The opacity of a mask. A picture with an alpha channel means that channel in files before version 2, whose exporters wrote leaves
-    /// so; Mitsuba 3 takes the luminance of its colours.
+    /// The opacity of a mask. A picture with an alpha channel means that channel in files before version 2, whose
+    /// exporters wrote leaves so; Mitsuba 3 takes the luminance of its colours.
     pub(super) fn opacity(&mut self, owner: &Element) -> Result<Option<ScalarInput>, LoadError> {
         if let Some(child) = owner.child("opacity").cloned() {
             let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
@@ -40,7 +40,8 @@ impl Reader {
                 }
                 self.builder
                     .note(format!("{place}: the opacity is the picture's alpha, as files before version 2 mean it."));
-                // As a surface's colour would ask for it: the luminance of its colours would be a second picture that nothing reads.
+                // As a surface's colour would ask for it: the luminance of its colours would be a second
+                // picture that nothing reads.
                 let picture = self.texture(&child, Meaning::Reflectance, 0)?;
                 return Ok(Some(ScalarInput { factor: picture.factor.x, texture: picture.texture.map(|t| (t, 3)) }));
             }
@@ -175,7 +176,8 @@ impl Reader {
     }
 }
 
-/// The rotation and the scale before it that take the axes of u and v to these; `None` where they do not stay perpendicular.
+/// The rotation and the scale before it that take the axes of u and v to these; `None` where they do not stay
+/// perpendicular.
 fn turn_and_stretch(along_u: Vec2, along_v: Vec2) -> Option<(f32, Vec2)> {
     let (length_u, length_v) = (along_u.length(), along_v.length());
     if along_u.dot(along_v).abs() > 1e-5 * length_u * length_v {

@@ -1,4 +1,4 @@
-//! `<transform>`: steps that are applied one after the other.
+//! Reads `<transform>`: steps that are applied one after the other.
 
 use super::super::error::LoadError;
 use super::element::Element;
@@ -43,8 +43,8 @@ fn look_at(step: &Element) -> Result<Affine3A, LoadError> {
     Ok(Affine3A::from_mat3_translation(glam::Mat3::from_cols(left, up, ahead), origin))
 }
 
-/// What Mitsuba takes for "up" where a file gives none: the first perpendicular of Duff et al. 2017 (Building an Orthonormal Basis,
-/// Revisited).
+/// What Mitsuba takes for "up" where a file gives none: the first perpendicular of Duff et al. 2017 (Building an
+/// Orthonormal Basis, Revisited).
 fn any_up(ahead: Vec3) -> Vec3 {
     let sign = 1.0_f32.copysign(ahead.z);
     let a = -1.0 / (sign + ahead.z);

@@ -74,8 +74,8 @@ impl Written {
         self.number("ns").map_or(0.5, |exponent| (2.0 / (exponent.max(0.0) + 2.0)).sqrt().sqrt())
     }
 
-    /// Strength and tint of a dielectric's reflection: face on in proportion to `Ks`, at 0.5 that of index 1.5, and at grazing angles
-    /// no stronger than all. It takes its light from what is diffuse. A picture gives the strength.
+    /// Strength and tint of a dielectric's reflection: face on in proportion to `Ks`, at 0.5 that of index 1.5, and at
+    /// grazing angles no stronger than all. It takes its light from what is diffuse. A picture gives the strength.
     fn highlight(&self, builder: &mut Builder) -> (ScalarInput, ColorInput) {
         let told = self.color("ks").map(|told| told.min(Vec3::ONE)).filter(|told| told.max_element() > 0.0);
         let relative = told.unwrap_or(Vec3::ONE) / USUAL_KS;
@@ -104,9 +104,9 @@ impl Written {
         }
     }
 
-    /// 4, 6, 7, 9 are "glass" in the format's list and 5 is a mirror that is used for glass, but exporters write 4 for all that they
-    /// have and 9 for whatever alpha leaves out. It is glass where something else says so: a tint of what comes through, a diffuse
-    /// colour of nothing, an index that bends what it lets through.
+    /// 4, 6, 7, 9 are "glass" in the format's list and 5 is a mirror that is used for glass, but exporters write 4 for
+    /// all that they have and 9 for whatever alpha leaves out. It is glass where something else says so: a tint of what
+    /// comes through, a diffuse colour of nothing, an index that bends what it lets through.
     fn glass(&self, builder: &mut Builder) -> Option<Surface> {
         let illumination = self.illumination();
         if !matches!(illumination, 4..=7 | 9) {

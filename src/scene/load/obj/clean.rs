@@ -1,4 +1,4 @@
-//! The text of an OBJ file as `tobj` can read it.
+//! Puts the text of an OBJ file as `tobj` can read it.
 
 use std::borrow::Cow;
 
@@ -18,9 +18,10 @@ pub(super) enum VertexColors {
     All,
 }
 
-/// The text with spaces for tabs, continued lines joined (blank lines keep the count), comments behind numbers and opacities behind colours cut off,
-/// a 0 behind texture coordinates of one number, and empty `usemtl` statements left out: all of these stop `tobj`. Points and lines
-/// are left out too: `tobj` takes a line for a face, and one without texture coordinates would take them from its whole object.
+/// The text with spaces for tabs, continued lines joined (blank lines keep the count), comments behind numbers and
+/// opacities behind colours cut off, a 0 behind texture coordinates of one number, and empty `usemtl` statements left
+/// out: all of these stop `tobj`. Points and lines are left out too: `tobj` takes a line for a face, and one without
+/// texture coordinates would take them from its whole object.
 pub(super) fn clean(text: &str) -> Cleaned {
     let text = &*with_spaces_for_tabs(text);
     let is_vertex = |line: &&str| line.starts_with("v ");
@@ -91,8 +92,8 @@ fn before_word(line: &str, number: usize) -> &str {
     &line[..word.as_ptr() as usize - line.as_ptr() as usize]
 }
 
-/// Puts the names of material files before everything else where some come after a use of a material, which `tobj` would not know yet.
-/// Returns by how many lines the text grows.
+/// Puts the names of material files before everything else where some come after a use of a material, which `tobj`
+/// would not know yet. Returns by how many lines the text grows.
 pub(super) fn hoist_libraries(text: &mut String) -> usize {
     let is_library = |line: &&str| line.starts_with("mtllib ");
     let first_use = text.lines().position(|line| line.starts_with("usemtl ")).unwrap_or(usize::MAX);
@@ -122,7 +123,8 @@ mod tests {
         assert_eq!(text, "v 1 2 3 0.5 0.5 0.5 \nvt 0.5  0\nvt 0 1\n");
     }
 
-    /// "v" and "vt" were known by the space behind them alone: such files were refused, or lost their colours without a word.
+    /// Regression: "v" and "vt" were known by the space behind them alone: such files were refused, or lost
+    /// their colours without a word.
     #[test]
     fn tabs_part_words_as_spaces_do() {
         for spaced in [

@@ -1,4 +1,4 @@
-//! The MTL files of an OBJ file, and what its faces use of them.
+//! Finds the MTL files of an OBJ file, and what its faces use of them. What is in them is left to `mtl`.
 
 use super::super::builder::Builder;
 use super::super::error::{LoadError, Place, nearest};
@@ -52,8 +52,8 @@ impl Libraries {
         }
     }
 
-    /// What `tobj` wants to know of the materials of an `mtllib` statement: their names. It counts on from what it has. Its files are
-    /// read when the first part of the text names them.
+    /// What `tobj` wants to know of the materials of an `mtllib` statement: their names. It counts on from what it has.
+    /// Its files are read when the first part of the text names them.
     pub(super) fn of_statement(&mut self, number: usize, obj: &Path, named: &str) -> tobj::MTLLoadResult {
         if number == self.ends.len() {
             self.open(obj, named);

@@ -1,4 +1,4 @@
-//! What `tobj` makes of a text, and where its errors are.
+//! Reads what `tobj` makes of a text, and finds where its errors are.
 
 use super::super::error::{LoadError, Place};
 use super::libraries::Libraries;

@@ -1,7 +1,7 @@
 //! Faces by what their corners have: positions alone, or texture coordinates or normals beside them.
 //!
-//! `tobj` keeps one array of each for an object, which belong together only where all of its faces have the same. So a file of several
-//! kinds of faces is read once for each, with the lines of all the others left empty.
+//! `tobj` keeps one array of each for an object, which belong together only where all of its faces have the same. So a
+//! file of several kinds of faces is read once for each, with the lines of all the others left empty.
 
 use std::borrow::Cow;
 
@@ -33,8 +33,8 @@ impl Corners {
     }
 }
 
-/// For each pattern of a file's faces the text whose faces all have it, line for line that of the file. Each is made when it is asked
-/// for: together they may take four times the file.
+/// Separates, for each pattern of a file's faces, the text whose faces all have it, line for line that of the file.
+/// Each is made when it is asked for: together they may take four times the file.
 pub(super) fn separate(text: &str) -> impl Iterator<Item = Cow<'_, str>> {
     let mut patterns: Vec<Pattern> = Vec::new();
     let mut are_ragged = false;

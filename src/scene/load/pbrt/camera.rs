@@ -157,14 +157,16 @@ impl Reader<'_> {
         }
     }
 
-    /// The motion of what `before` places at rest: along `at` from start to end of `TransformTimes`, with keys at so many steps.
+    /// The motion of what `before` places at rest: along `at` from start to end of `TransformTimes`, with keys at so
+    /// many steps.
     fn motion_after(&self, before: Affine3A, steps: u16, at: impl Fn(f32) -> Affine3A) -> Option<Motion> {
         if self.shutter[1] <= self.shutter[0] {
             return None;
         }
         let (opens, stays_open) = (f64::from(self.shutter[0]), f64::from(self.shutter[1] - self.shutter[0]));
         let frame_time = self.options.frame_time;
-        // Before and after `TransformTimes` everything rests: where the shutter reaches beyond, the motion does not fill it.
+        // Before and after `TransformTimes` everything rests: where the shutter reaches beyond, the motion does not
+        // fill it.
         let [start, end] = self.times;
         let times =
             (0..=steps).map(|step| f64::from(step) / f64::from(steps)).map(|way| start * (1.0 - way) + end * way);
@@ -186,8 +188,8 @@ impl Reader<'_> {
         self.share_of(f64::from(self.shutter[0]))
     }
 
-    /// How far a time lies between those of `TransformTimes`. Subtracted before it is narrowed: a shot's later hours have f32 times
-    /// a frame apart.
+    /// How far a time lies between those of `TransformTimes`. Subtracted before it is narrowed: a shot's later hours
+    /// have f32 times a frame apart.
     fn share_of(&self, time: f64) -> f32 {
         let [start, end] = self.times;
         let time = time + self.options.frame_time;

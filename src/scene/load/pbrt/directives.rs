@@ -1,4 +1,4 @@
-//! Directives: what each does to the state, and which file is read next.
+//! Reads directives: what each does to the state, and which file is read next.
 
 use super::super::error::{LoadError, Place, no_such, suggestion};
 use super::super::files;

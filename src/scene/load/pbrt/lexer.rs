@@ -1,4 +1,4 @@
-//! Words, strings and brackets of a pbrt file, each with its line.
+//! Words, strings and brackets of a pbrt file, each with its line. What they mean is left to `directives`.
 
 use super::super::error::{LoadError, Place};
 use std::borrow::Cow;
@@ -45,7 +45,7 @@ impl<'a> Lexer<'a> {
         }
     }
 
-    /// The same without going on.
+    /// The next token and its line, without going on; `None` at the end.
     pub(super) fn peek(&mut self) -> Result<Option<&Token<'a>>, LoadError> {
         if self.peeked.is_none() {
             self.peeked = self.read()?;

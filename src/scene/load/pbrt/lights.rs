@@ -1,7 +1,7 @@
 //! `LightSource`, and the radiance of `AreaLightSource`.
 //!
-//! A light's RGB is radiance as it stands, any other spectrum gives luminance 1 (see [`super::inputs`]); `power` is lumen
-//! and `illuminance` lux, spread as pbrt-v4 does (its `lights.cpp`).
+//! A light's RGB is radiance as it stands, any other spectrum gives luminance 1 (see [`super::inputs`]); `power` is
+//! lumen and `illuminance` lux, spread as pbrt-v4 does (its `lights.cpp`).
 
 use super::super::error::LoadError;
 use super::super::{environment, luminance};
@@ -22,7 +22,7 @@ pub(super) struct Emission {
 }
 
 impl Reader<'_> {
-    /// `LightSource`.
+    /// Reads `LightSource`.
     pub(super) fn light(&mut self, kind: &str, parameters: &Parameters) -> Result<(), LoadError> {
         let to_world = self.here(&self.state.transforms);
         if self.state.transforms.moves() {

@@ -1,4 +1,4 @@
-//! `Material` and its named kin, and the media behind their surfaces.
+//! Reads `Material` and its named kin, and the media behind their surfaces.
 
 use super::super::error::{LoadError, no_such, suggestion};
 use super::super::metals::Metal;
@@ -74,7 +74,7 @@ pub(super) struct Medium {
 }
 
 impl Reader<'_> {
-    /// `MakeNamedMedium`: absorption is kept, scattering and its like are named.
+    /// Reads `MakeNamedMedium`: absorption is kept, scattering and its like are named.
     pub(super) fn medium(&mut self, name: &str, parameters: &Parameters) -> Result<(), LoadError> {
         let kind = parameters.string("type")?.unwrap_or("homogeneous");
         if kind != "homogeneous" {
@@ -262,7 +262,8 @@ impl Reader<'_> {
         Ok(color.unwrap_or(ColorInput::constant(Vec3::splat(default))))
     }
 
-    /// A picture of reflectances darkens the metal of its brightest texel: as in pbrt face on, and no brighter at grazing angles.
+    /// A picture of reflectances darkens the metal of its brightest texel: as in pbrt face on, and no
+    /// brighter at grazing angles.
     fn conductor(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
         let Some(color) = self.metal_color(parameters, "")? else {
             let Metal { eta, k } = self.metal(parameters, "")?;

@@ -1,9 +1,9 @@
 //! pbrt-v4 scene files, by a reader of our own: the subset that scenes/README.md lists.
 //!
-//! pbrt's camera looks along +z with x to the right, so scenes written for it are left-handed or carry a mirroring camera
-//! transform; both end in [`Camera::mirrored`](crate::scene::Camera::mirrored). Radiance is multiplied by the sensor's
-//! exposure, so that pixels have pbrt's own values, and `nits_per_unit` divided by it. Integrators, samplers and filters
-//! are fechner's.
+//! pbrt's camera looks along +z with x to the right, so scenes written for it are left-handed or carry a mirroring
+//! camera transform; both end in [`Camera::mirrored`](crate::scene::Camera::mirrored). Radiance is multiplied by the
+//! sensor's exposure, so that pixels have pbrt's own values, and `nits_per_unit` divided by it. Integrators, samplers
+//! and filters are fechner's.
 
 mod camera;
 mod directives;
@@ -133,7 +133,7 @@ struct Reader<'a> {
     in_world: bool,
     is_photometric: bool,
     includes: usize,
-    /// Of meshes that stand for spheres and their like.
+    /// Vertices of meshes that stand for spheres and their like.
     made_vertices: usize,
 }
 

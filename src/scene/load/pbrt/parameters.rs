@@ -164,7 +164,7 @@ impl Parameters {
         }
     }
 
-    /// One number.
+    /// A parameter of one number.
     pub(super) fn float(&self, name: &str) -> Result<Option<f32>, LoadError> {
         Ok(self.exactly::<1>(&["float"], name)?.map(|[value]| value as f32))
     }

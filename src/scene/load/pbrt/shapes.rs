@@ -1,8 +1,8 @@
 //! `Shape`: meshes, PLY files, spheres, disks, cylinders, bilinear patches.
 //!
-//! The front of a surface, from which one-sided lights shine and glass is told from air, is where pbrt has it: on the side of
-//! the shading normals where there are any, else by the winding, and turned over by `ReverseOrientation`; that of a sphere, disk or
-//! cylinder by a transform that mirrors too.
+//! The front of a surface, from which one-sided lights shine and glass is told from air, is where pbrt has it: on the
+//! side of the shading normals where there are any, else by the winding, and turned over by `ReverseOrientation`; that
+//! of a sphere, disk or cylinder by a transform that mirrors too.
 
 use super::super::error::LoadError;
 use super::super::{ply, shapes};
@@ -74,7 +74,8 @@ impl Reader<'_> {
         })
     }
 
-    /// A sphere that stays analytic: its transforms leave it one at all times and nothing asks for pbrt's own coordinates.
+    /// A sphere that stays analytic: its transforms leave it one at all times and nothing asks for pbrt's own
+    /// coordinates.
     fn ball(&self, radius: f32) -> Option<Ball> {
         let transforms = &self.state.transforms;
         let placed = self.here(transforms);
@@ -102,8 +103,9 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Whether the front of a shape is on its other side. The normal of a sphere, disk or cylinder pbrt flips before it carries it out
-    /// (`InteractionFromIntersection`), where the transform mirrors; that of a shape that moves is carried out later.
+    /// Whether the front of a shape is on its other side. The normal of a sphere, disk or cylinder pbrt flips
+    /// before it carries it out (`InteractionFromIntersection`), where the transform mirrors; that of a shape that
+    /// moves is carried out later.
     fn is_turned_over(&self, kind: &str) -> bool {
         let transforms = &self.state.transforms;
         let is_mirrored = || !transforms.moves() && transforms.at(0.0).matrix3.determinant() < 0.0;
@@ -218,8 +220,8 @@ fn full_turn(parameters: &Parameters) -> Result<f32, LoadError> {
     Ok(parameters.float_or("phimax", 360.0)?.clamp(0.0, 360.0).to_radians())
 }
 
-/// A surface over (u, v) in [0, 1]² from its points and normals; v runs up in pbrt's coordinates. Where a row is one point, as at a pole,
-/// half of its triangles are not there.
+/// A surface over (u, v) in [0, 1]² from its points and normals; v runs up in pbrt's coordinates. Where a row is one
+/// point, as at a pole, half of its triangles are not there.
 fn grid(surface: impl Fn(f32, f32) -> (Vec3, Vec3)) -> Mesh {
     let mut mesh = Mesh::default();
     for row in 0..=ALONG {

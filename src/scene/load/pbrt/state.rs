@@ -53,11 +53,11 @@ pub(super) struct Carried {
 
 /// How a carried part goes.
 pub(super) enum Path {
-    /// As with one pair of transforms.
+    /// A path as with one pair of transforms.
     Whole(Transforms),
-    /// At rest in what moves.
+    /// A path at rest in what moves.
     After { inner: Affine3A, outer: Transforms },
-    /// As neither its own poses nor those of its instance go.
+    /// A path that is neither that of its own poses nor that of its instance's.
     Apart,
 }
 
@@ -132,7 +132,7 @@ impl State {
     }
 }
 
-/// `LookAt`: world to camera, left-handed, z ahead. `None` if the vectors span no frame.
+/// Transform of `LookAt`: world to camera, left-handed, z ahead. `None` if the vectors span no frame.
 pub(super) fn look_at(eye: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
     let ahead = (target - eye).try_normalize()?;
     let right = up.try_normalize()?.cross(ahead).try_normalize()?;

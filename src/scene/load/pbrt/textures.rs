@@ -1,4 +1,5 @@
-//! `Texture`: image maps and constants here, products, mixes and checkerboards in `combined`. What else pbrt can compute is named and averaged.
+//! `Texture`: image maps and constants here, products, mixes and checkerboards in `combined`. What else pbrt can
+//! compute is named and averaged.
 
 mod combined;
 

@@ -13,7 +13,7 @@ pub(super) struct Values<'a> {
 }
 
 impl<'a> Values<'a> {
-    /// Those of a file.
+    /// The values of a file's body.
     pub(super) fn new(path: &'a Path, bytes: &'a [u8], header: &Header) -> Self {
         Self { path, bytes, at: header.body, encoding: header.encoding }
     }
@@ -25,7 +25,7 @@ impl<'a> Values<'a> {
         LoadError::invalid_at(Place { file: self.path.to_owned(), line }, problem)
     }
 
-    /// That of a number among indices that is none.
+    /// An error at the number that was read last, which is among indices and is none.
     pub(super) fn no_index(&self, number: impl std::fmt::Display) -> LoadError {
         self.error(format_args!("{number} is not a vertex index"))
     }

@@ -1,4 +1,4 @@
-//! The header: which elements the body holds, in which encoding.
+//! The header: which elements the body holds, in which encoding. No number of the body is read.
 
 use super::super::error::{LoadError, Place};
 use std::path::Path;
@@ -61,7 +61,7 @@ pub(super) struct Property {
     pub(super) list: Option<Kind>,
 }
 
-/// So many rows of properties.
+/// So many rows of properties under one name.
 #[derive(Clone, Debug)]
 pub(super) struct Element {
     pub(super) name: String,

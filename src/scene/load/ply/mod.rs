@@ -1,8 +1,9 @@
 //! Stanford PLY meshes: ASCII and binary of both byte orders, plain or under gzip.
 //!
-//! Vertices (`x y z`, `nx ny nz`, `u v` or `s t` and their longer names), faces and `tristrips` (`vertex_indices`) are read, everything
-//! else is skipped and named. Written by ourselves: a million triangles load in little more than reading their bytes
-//! takes (benches/results/loading.md), and every count is checked against the bytes that are there before memory is taken for it.
+//! Vertices (`x y z`, `nx ny nz`, `u v` or `s t` and their longer names), faces and `tristrips` (`vertex_indices`) are
+//! read, everything else is skipped and named. Written by ourselves: a million triangles load in little more than
+//! reading their bytes takes (benches/results/loading.md), and every count is checked against the bytes that are there
+//! before memory is taken for it.
 
 mod body;
 mod header;

@@ -1,12 +1,12 @@
-//! Strips of triangles, which some scanners' files have in place of faces.
+//! Reads strips of triangles, which some scanners' files have in place of faces.
 
 use super::super::error::LoadError;
 use super::body::Values;
 use super::header::Element;
 use super::{Polygons, all_but_corners, is_corners};
 
-/// Adds the triangles of every strip; an index below 0 ends a strip, and what follows begins another. Returns the names of
-/// what is not used.
+/// Adds the triangles of every strip; an index below 0 ends a strip, and what follows begins another. Returns the
+/// names of what is not used.
 pub(super) fn read<'h>(
     values: &mut Values,
     element: &'h Element,

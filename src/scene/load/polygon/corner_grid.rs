@@ -1,4 +1,4 @@
-//! Corners of a polygon in the plane by where they are.
+//! Finds corners of a polygon in the plane by where they are.
 
 use glam::DVec2;
 
@@ -64,7 +64,8 @@ impl CornerGrid {
     }
 }
 
-/// The least and the greatest x of a triangle's edges between `row` and `row + 1`; of the whole triangle where rounding finds none.
+/// The least and the greatest x of a triangle's edges between `row` and `row + 1`; of the whole triangle
+/// where rounding finds none.
 fn reach(corners: &[DVec2; 3], row: f64) -> [f64; 2] {
     let [a, b, c] = *corners;
     let mut reach = [f64::INFINITY, f64::NEG_INFINITY];

@@ -1,7 +1,8 @@
 //! Ear clipping: of the corners that can be cut off, the one of the lowest number goes first.
 //!
-//! A corner that cannot be is looked at again only once what hinders it has gone, which is either a neighbour or a corner inside its
-//! triangle; the latter are looked up in a grid. The time still grows nearly with the square: of a letter C by 3.6 for twice its corners.
+//! A corner that cannot be is looked at again only once what hinders it has gone, which is either a neighbour or a
+//! corner inside its triangle; the latter are looked up in a grid. The time still grows nearly with the square: of a
+//! letter C by 3.6 for twice its corners.
 
 use super::corner_grid::CornerGrid;
 use super::turn;

@@ -1,7 +1,8 @@
 //! CIE tables at 5 nm from 360 to 830 nm.
 //!
-//! Colour matching functions of the 1931 standard observer (ISO/CIE 11664-1) and the relative power of standard illuminant
-//! D65 (ISO/CIE 11664-2, 100 at 560 nm; held from 780 nm on, where the observer sees nothing). Used by [`super`] only.
+//! Colour matching functions of the 1931 standard observer (ISO/CIE 11664-1) and the relative power of
+//! standard illuminant D65 (ISO/CIE 11664-2, 100 at 560 nm; held from 780 nm on, where the observer sees
+//! nothing). Used by [`super`] only.
 
 /// Wavelength of the first row in nanometres.
 pub(super) const FIRST_NM: f64 = 360.0;

@@ -1,8 +1,8 @@
 //! Spectra of scene files as linear Rec.709 RGB: tables, blackbodies, named illuminants, metals and glasses.
 //!
 //! A spectrum is integrated against the CIE 1931 observer. What reflects or refracts is seen under D65, so that a flat
-//! spectrum is grey; what emits is seen as it is. Three numbers are not a spectral render: dispersion and metamerism are
-//! lost, and colours outside Rec.709 are brought into it at the luminance that they have.
+//! spectrum is grey; what emits is seen as it is. Three numbers are not a spectral render: dispersion and metamerism
+//! are lost, and colours outside Rec.709 are brought into it at the luminance that they have.
 
 mod cie;
 pub(in crate::scene::load) mod named;
@@ -26,7 +26,8 @@ pub(super) struct Spectrum {
 }
 
 impl Spectrum {
-    /// From pairs of nanometres and values, in any order; `None` without a pair or with one that is not finite.
+    /// A spectrum of pairs of nanometres and values, in any order; `None` without a pair or with one that is not
+    /// finite.
     pub(super) fn from_pairs(pairs: impl IntoIterator<Item = [f64; 2]>) -> Option<Self> {
         let mut samples: Vec<[f64; 2]> = pairs.into_iter().collect();
         if samples.is_empty() || !samples.iter().flatten().all(|value| value.is_finite()) {
@@ -38,13 +39,13 @@ impl Spectrum {
         Some(Self { samples, holds_beyond })
     }
 
-    /// From a list λ₀ v₀ λ₁ v₁ ...
+    /// A spectrum of a list λ₀ v₀ λ₁ v₁ ...
     pub(super) fn from_list(list: &[f64]) -> Option<Self> {
         let (pairs, rest) = list.as_chunks::<2>();
         if rest.is_empty() { Self::from_pairs(pairs.iter().copied()) } else { None }
     }
 
-    /// From a text file of one pair a line, comments behind `#`.
+    /// A spectrum of a text file of one pair a line, comments behind `#`.
     pub(super) fn from_text(text: &str) -> Option<Self> {
         let mut pairs = Vec::new();
         for line in text.lines() {
@@ -72,8 +73,9 @@ impl Spectrum {
         Self::from_pairs(rows().map(|nm| [nm, planck(nm) / peak]))
     }
 
-    /// The same between two wavelengths in nanometres, 0 beyond them. Its ends are ramps of one step of the integration, so that no more
-    /// and no less than what lies between counts wherever they fall: 5000 K from 500 to 600 nm had 3.5 % too much red with steep ones.
+    /// This spectrum between two wavelengths in nanometres, 0 beyond them. Its ends are ramps of one step of the
+    /// integration, so that no more and no less than what lies between counts wherever they fall: with steep ones 5000
+    /// K from 500 to 600 nm has 3.5 % too much red.
     pub(super) fn within(&self, from_nm: f64, to_nm: f64) -> Self {
         let half_nm = (0.5 * INTEGRATION_NM).min(0.5 * (to_nm - from_nm));
         let outer_nm = (from_nm - half_nm)..=(to_nm + half_nm);
@@ -116,7 +118,7 @@ impl Spectrum {
         within_rec709(xyz_to_rgb(self.xyz(|_| 1.0)))
     }
 
-    /// The same with luminance 1; `None` for light that cannot be seen.
+    /// The colour of light of this spectrum with luminance 1; `None` for light that cannot be seen.
     pub(super) fn emission_of_luminance_1(&self) -> Option<Vec3> {
         let color = self.emission();
         let luminance = luminance(color);
@@ -177,7 +179,8 @@ mod tests {
         assert!((red.reflectance() / expected - 1.0).abs().max_element() < 1e-2, "{}", red.reflectance());
     }
 
-    /// Sodium's light lies outside Rec.709: with its blue cut off it was too bright, and lasers' by a third and more.
+    /// Sodium's light lies outside Rec.709. Regression: with its blue cut off it was too bright, and lasers' by a third
+    /// and more.
     #[test]
     fn light_of_one_wavelength_keeps_its_luminance() {
         for nm in [460.0, 500.0, 520.0, 589.0, 640.0] {

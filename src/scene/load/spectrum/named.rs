@@ -1,9 +1,9 @@
 //! Spectra that scene files call by name.
 //!
-//! Metals: gold, silver, copper: P. B. Johnson and R. W. Christy, Phys. Rev. B 6, 4370 (1972); chromium, iron: the same,
-//! Phys. Rev. B 9, 5056 (1974); aluminium: A. D. Rakić, Appl. Opt. 34, 4755 (1995); brass (Cu 70 %, Zn 30 %): M. R. Querry,
-//! CRDC-CR-85034 (1985); all read from refractiveindex.info (CC0). Glasses: n at 587.6 nm from Schott's catalogue.
-//! Illuminants: chromaticities of CIE 15:2004, tables T.3 and T.8, and of ACES's D60.
+//! Metals: gold, silver, copper: P. B. Johnson and R. W. Christy, Phys. Rev. B 6, 4370 (1972); chromium, iron: the
+//! same, Phys. Rev. B 9, 5056 (1974); aluminium: A. D. Rakić, Appl. Opt. 34, 4755 (1995); brass (Cu 70 %, Zn 30 %): M.
+//! R. Querry, CRDC-CR-85034 (1985); all read from refractiveindex.info (CC0). Glasses: n at 587.6 nm from Schott's
+//! catalogue. Illuminants: chromaticities of CIE 15:2004, tables T.3 and T.8, and of ACES's D60.
 
 use super::{Spectrum, within_rec709, xyz_to_rgb};
 use crate::scene::load::metals::Metal;

@@ -1,4 +1,4 @@
-//! Who writes of a kind that is not rendered is told of every one that is.
+//! Tests that who writes of a kind that is not rendered is told of every one that is.
 
 use super::super::{LoadOptions, load};
 
@@ -9,7 +9,7 @@ fn error_of(file: &str, text: &str) -> String {
     load(&path, &LoadOptions::default()).expect_err("it has a kind that is not rendered").to_string()
 }
 
-/// Telecentric sensors were rendered and not named, nor were twelve BSDFs.
+/// Regression: telecentric sensors were rendered and not named, nor were twelve BSDFs.
 #[test]
 fn errors_name_every_kind_that_is_rendered() {
     let mitsuba = |body: &str| error_of("scene.xml", &format!("<scene version=\"3.0.0\">{body}</scene>"));

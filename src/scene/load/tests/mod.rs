@@ -1,4 +1,4 @@
-//! What readers of several formats promise alike.
+//! Tests what readers of several formats promise alike.
 
 mod kinds;
 mod over_time;

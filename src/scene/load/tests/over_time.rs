@@ -1,5 +1,5 @@
-//! What one file holds at different times: the same things under the same numbers, seen and lit in the same way, where nothing in
-//! the file changes that.
+//! What one file holds at different times: the same things under the same numbers, seen and lit in the same way, where
+//! nothing in the file changes that.
 
 use crate::scene::hash::content_hash;
 use crate::scene::load::{LoadError, LoadOptions, load};
@@ -83,8 +83,8 @@ fn is_numbered_alike(file: &File, times: &[f64]) {
     }
 }
 
-/// glTF's way to hide a thing is a scale of 0. Before, whatever came after it was renumbered, and so had velocities of other things:
-/// 20.6 pixels instead of 0.9.
+/// glTF's way to hide a thing is a scale of 0. Regression: whatever came after it was renumbered, and so had velocities
+/// of other things: 20.6 pixels instead of 0.9.
 #[test]
 fn what_is_hidden_keeps_its_number() {
     let scales = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
@@ -157,7 +157,7 @@ keyframes = [ { time = 1, scale = 1 }, { time = 2, scale = 2 } ]
     assert_eq!(file.at(0.0).spheres.len(), 1);
 }
 
-/// Triangles that a morph target flattens keep their numbers. Before, a face at rest had 26.8 pixels of motion.
+/// Triangles that a morph target flattens keep their numbers. Regression: a face at rest had 26.8 pixels of motion.
 #[test]
 fn triangles_of_what_deforms_keep_their_numbers() {
     // Weights 0, 1, 0; then the target, which puts the third corner into the first.
@@ -175,7 +175,8 @@ fn triangles_of_what_deforms_keep_their_numbers() {
     }
 }
 
-/// The studio that stands in for light stays where it is when the camera turns: a wall in front of it went from 613 to 901 cd/m².
+/// The studio that stands in for light stays where it is when the camera turns: a wall in front of it went from 613 to
+/// 901 cd/m².
 #[test]
 fn a_studio_does_not_turn_with_the_camera() {
     let turns: Vec<f32> = [0.0_f32, 1.0, 2.0].iter().flat_map(|a| Quat::from_rotation_y(*a).to_array()).collect();
@@ -240,8 +241,8 @@ fn a_sphere_of_pbrt_that_is_squashed_is_a_mesh() {
     assert_eq!(pbrt("", "0 1", "Scale 4 4 4", sphere).at(0.0).spheres.len(), 1);
 }
 
-/// pbrt turns instance and part each by itself: a part beside the axis of a quarter turn went along the chord, 0.92 from the axis half
-/// way instead of 1.3, and one that turned inside a stretched instance was bent.
+/// pbrt turns instance and part each by itself. Regression: a part beside the axis of a quarter turn went along the
+/// chord, 0.92 from the axis half way instead of 1.3, and one that turned inside a stretched instance was bent.
 #[test]
 fn parts_of_pbrts_objects_go_with_their_instances() {
     /// Where a point of the part is at a share of the way.
@@ -336,7 +337,8 @@ fn turns_go_as_far_as_they_are_written() {
     assert!(said.contains("half a turn"), "{said}");
 }
 
-/// Beyond 65,535 bytes reading them ended in a panic: blanks, as many as a format's width, brought them to their place.
+/// Regression: beyond 65,535 bytes reading them ended in a panic. Blanks, as many as a format's width,
+/// brought them to their place.
 #[test]
 fn keyframes_may_stand_anywhere_in_a_long_file() {
     let object = "[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"late\"\n";
@@ -361,8 +363,8 @@ fn keyframes_may_stand_anywhere_in_a_long_file() {
     assert!(wrong.to_string().contains(":6010: materials.late.reflectance: "), "{wrong}");
 }
 
-/// Keyframes are cut into pieces of a quarter turn: 46 kB of them were 116 MB, 1024 pieces from each to the next one, and so were 113 kB
-/// of objects.
+/// Keyframes are cut into pieces of a quarter turn. Regression: 46 kB of them were 116 MB, 1024 pieces from each to the
+/// next one, and so were 113 kB of objects.
 #[test]
 fn keyframes_of_many_turns_are_few_poses() {
     let turning = |keyframes: &str| {

@@ -1,5 +1,6 @@
-//! Decoding pictures: PNG, JPEG, Radiance HDR, TGA, TIFF, BMP, WebP through `image`, OpenEXR through `exr_read`. 8-bit pictures stay bytes
-//! (4 a texel), all others become linear floats (16 a texel).
+//! Decoding pictures: PNG, JPEG, Radiance HDR, TGA, TIFF, BMP, WebP through `image`, OpenEXR through
+//! `exr_read`. 8-bit pictures stay bytes (4 a texel), all others become linear floats (16 a texel). Which
+//! texture wants what is left to [`super`].
 
 use super::Picture;
 use crate::exr_read::layers::colour_layer;
@@ -44,7 +45,8 @@ impl Decoded {
         Self { width, height, texels, is_premultiplied: false, notes: Vec::new() }
     }
 
-    /// The colours of what its alpha says is there: the alpha will multiply them. Light without coverage, as a glow has, stays.
+    /// The colours of what its alpha says is there: the alpha will multiply them. Light without coverage, as a glow
+    /// has, stays.
     pub(super) fn without_alpha_in_colours(mut self) -> Self {
         if let (true, Texels::Floats(texels)) = (self.is_premultiplied, &mut self.texels) {
             for [rgb @ .., alpha] in Arc::make_mut(texels).iter_mut().filter(|[.., alpha]| *alpha > 0.0 && *alpha < 1.0)
@@ -60,11 +62,13 @@ impl Decoded {
 /// What a picture's values are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::scene::load) enum Values {
-    /// Of the primaries that the file names, to be brought into Rec.709: light and reflectances, which are never negative.
+    /// Colours of the primaries that the file names, to be brought into Rec.709: light and reflectances,
+    /// which are never negative.
     Colours,
-    /// Of the primaries that the file names, to be weighed as Rec.709's: heights among them, which may be negative.
+    /// Values of the primaries that the file names, to be weighed as Rec.709's: heights among them, which may be
+    /// negative.
     Luminances,
-    /// As they stand: normals, roughness, coverage.
+    /// Numbers as they stand: normals, roughness, coverage.
     Numbers,
 }
 
@@ -176,8 +180,8 @@ fn limited<R: std::io::BufRead + std::io::Seek>(mut reader: ImageReader<R>) -> I
     reader
 }
 
-/// Linear texels: 16-bit integers under the sRGB curve are unfolded, floats are linear already, but for what the header of a
-/// Radiance file says.
+/// Linear texels: 16-bit integers under the sRGB curve are unfolded, floats are linear already, but for what the
+/// header of a Radiance file says.
 fn linear_floats(
     image: DynamicImage,
     encoding: Encoding,
@@ -245,8 +249,8 @@ fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, Load
     Ok(Decoded { is_premultiplied: alpha.is_some(), notes, ..Decoded::of_texels([width, height], texels) })
 }
 
-/// The channels of an EXR file that a texture is made of: R, G, B and A of the picture's layer; where no layer has all colours, of any; else
-/// luminance, chroma and CIE XYZ.
+/// The channels of an EXR file that a texture is made of: R, G, B and A of the picture's layer; where no layer has all
+/// colours, of any; else luminance, chroma and CIE XYZ.
 fn used_channels(all: &[String]) -> Vec<String> {
     let names: Vec<&str> = all.iter().map(String::as_str).collect();
     let layer = colour_layer(&names).map(|layer| layer.name);
@@ -263,7 +267,8 @@ fn used_channels(all: &[String]) -> Vec<String> {
     }
 }
 
-/// A channel of the picture's layer by its last name; where no layer has all colours, that of the layer without a name before others.
+/// A channel of the picture's layer by its last name; where no layer has all colours, that of the layer
+/// without a name before others.
 fn channel<'a>(image: &'a ExrImage, wanted: &str) -> Option<&'a [f32]> {
     match colour_layer(&image.names()) {
         Some(layer) => image.part(layer.name, wanted),

@@ -1,10 +1,10 @@
 //! Keyframes of materials and lights: numbers and colours that change in time.
 //!
-//! `keyframes = [{ time = 0, intensity_cd = 0 }, { time = 1, intensity_cd = 800 }]` stands for `intensity_cd = 400` half a
-//! second after the beginning. What the keyframes say at the moment when the shutter opens is put in their place before
-//! anything else is read, so that every number and colour of every material and light can move, and each is checked as if
-//! it had been written. Nothing of this changes while the shutter is open. Not for cameras and objects, which move
-//! meanwhile: see [`super::motion`].
+//! `keyframes = [{ time = 0, intensity_cd = 0 }, { time = 1, intensity_cd = 800 }]` stands for `intensity_cd = 400`
+//! half a second after the beginning. What the keyframes say at the moment when the shutter opens is put in their place
+//! before anything else is read, so that every number and colour of every material and light can move, and each is
+//! checked as if it had been written. Nothing of this changes while the shutter is open. Not for cameras and objects,
+//! which move meanwhile: see [`super::motion`].
 
 use super::fields::{Fields, Source, Value};
 use super::motion::{Between, Keyframes};

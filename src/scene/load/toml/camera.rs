@@ -1,4 +1,4 @@
-//! `[camera]`.
+//! Reads `[camera]`.
 
 use super::fields::{Fields, Value};
 use super::motion;

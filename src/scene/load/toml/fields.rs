@@ -144,7 +144,7 @@ impl<'a> Value<'a> {
         self.value.as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }
 
-    /// One of some words.
+    /// Reads one of some words and gives what stands beside it.
     pub(super) fn choice<T: Copy>(&self, words: &[(&'static str, T)]) -> Result<T, LoadError> {
         let written = self.string()?;
         words
@@ -154,7 +154,7 @@ impl<'a> Value<'a> {
             .ok_or_else(|| self.unknown_value(written, words.iter().map(|&(word, _)| word)))
     }
 
-    /// One of these words.
+    /// Reads one of these words.
     pub(super) fn word_of(&self, words: impl Iterator<Item = &'static str> + Clone) -> Result<String, LoadError> {
         let written = self.string()?;
         match words.clone().any(|word| word == written) {
@@ -205,12 +205,12 @@ impl<'a> Value<'a> {
         self.vec3()?.try_normalize().ok_or_else(|| self.error("a direction must not have zero length"))
     }
 
-    /// Two numbers.
+    /// Reads two numbers.
     pub(super) fn vec2(&self) -> Result<Vec2, LoadError> {
         self.numbers::<2>("two numbers [u, v]").map(Vec2::from_array)
     }
 
-    /// One number for all three channels, or three; none below 0.
+    /// Reads one number for all three channels, or three; none below 0.
     pub(super) fn color(&self) -> Result<Vec3, LoadError> {
         let color = if self.is_array() {
             self.numbers::<3>("a colour [r, g, b]").map(Vec3::from_array)?
@@ -247,7 +247,7 @@ impl<'a> Fields<'a> {
         Ok(fields)
     }
 
-    /// The same, whatever its keys are.
+    /// The file's topmost table, whatever its keys are.
     pub(super) fn of_any(source: &'a Source<'a>, table: &'a DeTable<'a>) -> Self {
         Self { source, path: String::new(), line: 1, table }
     }
@@ -310,7 +310,7 @@ impl<'a> Fields<'a> {
         self.get(key).map(|value| read(&value)).transpose()
     }
 
-    /// Every entry, in the file's order: a picture must not depend on the alphabet.
+    /// Entries of the table, every one, in the file's order: a picture must not depend on the alphabet.
     pub(super) fn all(&self) -> Vec<(&'a str, Value<'a>)> {
         let mut entries: Vec<_> = self.table.iter().collect();
         entries.sort_by_key(|(key, _)| key.span().start);

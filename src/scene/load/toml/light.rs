@@ -1,4 +1,4 @@
-//! `[[lights]]`: point, spot and directional, in photometric units.
+//! Reads `[[lights]]`: point, spot and directional, in photometric units. Surfaces that shine are materials.
 
 use super::fields::{Fields, Value};
 use crate::scene::load::{LoadError, luminance};

@@ -1,4 +1,4 @@
-//! `[materials.*]`.
+//! Reads `[materials.*]`. The keys of a `type` are left to `surface`.
 
 use super::fields::{Fields, Value};
 use super::light::unit_luminance;

@@ -1,5 +1,5 @@
-//! Transforms and keyframes. Positions and scales move linearly between keyframes; before the first and after the last keyframe
-//! everything rests. Objects' own are in [`turns`].
+//! Transforms and keyframes. Positions and scales move linearly between keyframes; before the first and after the last
+//! keyframe everything rests. Objects' own are in [`turns`].
 
 mod turns;
 
@@ -45,7 +45,8 @@ impl<T> Keyframes<T> {
         Ok(Self { frames })
     }
 
-    /// Times at which the shutter opens and closes, those of keyframes between, and `between` more before each next one.
+    /// Times at which the shutter opens and closes, those of keyframes between, and `between` more before each next
+    /// one.
     fn times(&self, shutter: Shutter, between: u32) -> Vec<f64> {
         let closes = shutter.opens + shutter.stays_open;
         let inner = self.frames.iter().map(|(time, _)| *time).filter(|t| *t > shutter.opens && *t < closes);

@@ -1,4 +1,4 @@
-//! `[[objects]]`: meshes from files, and the simple shapes.
+//! Reads `[[objects]]`: meshes from files, and the simple shapes.
 
 use super::Context;
 use super::fields::{Fields, Value};
@@ -35,7 +35,7 @@ struct Placement {
 }
 
 impl<'m, 'a> Objects<'m, 'a> {
-    /// For a file of which so many objects have keyframes.
+    /// A reader of the objects of a file, of which so many have keyframes.
     pub(super) fn new(materials: &'m Materials<'a>, moving: usize) -> Self {
         Self { materials, files: HashMap::new(), read: 0, any_moves: false, most_cuts: motion::most_cuts(moving) }
     }
@@ -150,8 +150,8 @@ fn place_mesh(context: &mut Context, mesh: Mesh, fields: &Fields, placement: Pla
     Ok(())
 }
 
-/// A sphere stays analytic if its transform leaves it a sphere at all times: what is a sphere in one frame and a mesh in another
-/// would change the numbers of other objects, by which velocities know them.
+/// A sphere stays analytic if its transform leaves it a sphere at all times: what is a sphere in one frame and a mesh
+/// in another would change the numbers of other objects, by which velocities know them.
 fn place_sphere(context: &mut Context, shape: &Value, fields: &Fields, placement: Placement) -> Result<(), LoadError> {
     let own = shape.fields(&["center", "radius"])?;
     let center = own.require("center")?.vec3()?;
@@ -177,8 +177,8 @@ fn place_sphere(context: &mut Context, shape: &Value, fields: &Fields, placement
     Ok(())
 }
 
-/// The material; one that gives luminous power becomes the object's own, with the radiance for this area. A lamp that is flat for a
-/// moment of its keyframes is dark then.
+/// The material; one that gives luminous power becomes the object's own, with the radiance for this area. A lamp that
+/// is flat for a moment of its keyframes is dark then.
 fn with_power(
     context: &mut Context,
     entry: Entry,
@@ -213,7 +213,8 @@ fn with_power(
     Ok(context.builder.add_material(own))
 }
 
-/// Share of a surface that is there, and 1 where nothing is, which emits nothing at any radiance; `None` where a picture says.
+/// Share of a surface that is there, and 1 where nothing is, which emits nothing at any radiance; `None` where a
+/// picture says.
 fn opaque_share(alpha: &Alpha) -> Option<f64> {
     match alpha {
         Alpha::Mask { value, .. } | Alpha::Blend { value } if value.texture.is_some() => None,

@@ -1,8 +1,8 @@
 //! The side file: `scene.fechner.toml` beside a scene of another format adds what that format lacks.
 //!
-//! It may hold `nits_per_unit`, `[film]`, `[view]`, `[camera]` (with keyframes), `[environment]` and `[[lights]]`, all as in
-//! our own format. Camera and environment take the place of the scene's, lights are added to them; a camera of which only `shutter_s` is
-//! given leaves the scene's own in place and blurs what moves in glTF.
+//! It may hold `nits_per_unit`, `[film]`, `[view]`, `[camera]` (with keyframes), `[environment]` and `[[lights]]`, all
+//! as in our own format. Camera and environment take the place of the scene's, lights are added to them; a camera of
+//! which only `shutter_s` is given leaves the scene's own in place and blurs what moves in glTF.
 
 use super::fields::{Fields, Source, Value};
 use super::{animated, camera, light, read_film, read_unit, read_view, surroundings};
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 
 const KNOWN: [&str; 6] = ["nits_per_unit", "film", "view", "camera", "environment", "lights"];
 
-/// The side file of a scene, if there is one with something in it. What has its name and is no file is refused: a link that leads nowhere
-/// was to bring lights and a camera.
+/// The side file of a scene, if there is one with something in it. What has its name and is no file is refused: a link
+/// that leads nowhere was meant to bring lights and a camera.
 pub(in crate::scene::load) fn of(scene: &Path) -> Result<Option<PathBuf>, LoadError> {
     let beside = side_file(scene);
     if std::fs::symlink_metadata(&beside).is_err() {
@@ -30,8 +30,8 @@ pub fn side_file(scene: &Path) -> PathBuf {
     scene.with_extension("fechner.toml")
 }
 
-/// The options with what the side file says of how its scene is read: its unit and size where the caller names none, whether light
-/// follows, and for how many seconds its camera keeps the shutter open.
+/// The options with what the side file says of how its scene is read: its unit and size where the caller names none,
+/// whether light follows, and for how many seconds its camera keeps the shutter open.
 pub(in crate::scene::load) fn before(path: &Path, options: &LoadOptions) -> Result<LoadOptions, LoadError> {
     with_root(path, 0.0, |root| {
         let film = root.get("film").map(|film| read_film(&film)).transpose()?;
@@ -50,7 +50,8 @@ pub(in crate::scene::load) fn before(path: &Path, options: &LoadOptions) -> Resu
     })
 }
 
-/// Adds everything to the scene, which was read with the options of [`before`]. The scene's own camera stays where the caller has asked for one by name.
+/// Adds everything to the scene, which was read with the options of [`before`]. The scene's own camera stays where the
+/// caller has asked for one by name.
 pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &mut Scene) -> Result<(), LoadError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     with_root(path, options.frame_time, |root| {

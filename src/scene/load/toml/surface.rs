@@ -1,4 +1,4 @@
-//! The `type` of a `[materials.*]` and the keys that belong to it.
+//! Reads the `type` of a `[materials.*]` and the keys that belong to it.
 
 use super::super::error::LoadError;
 use super::super::metals::{METALS, Metal};
@@ -16,7 +16,7 @@ pub(super) type Reader<'a> = fn(&Materials<'a>, &mut Context<'a>, &Fields<'a>) -
 /// A kind of surface: its name, its reader, the keys that it takes.
 pub(super) type Kind<'a> = (&'static str, Reader<'a>, &'static [&'static str]);
 
-/// Every kind.
+/// The kinds of surface that a `type` may name.
 pub(super) const fn kinds<'a>() -> [Kind<'a>; 14] {
     [
         ("diffuse", diffuse, &["reflectance"]),

@@ -1,4 +1,4 @@
-//! `[environment]`: a picture, one colour, or the sky of a place of the sun.
+//! Reads `[environment]`: a picture, one colour, or the sky of a place of the sun.
 
 use super::fields::Value;
 use super::light::unit_luminance;
@@ -15,7 +15,8 @@ pub(super) struct Surroundings {
     pub(super) sun: Option<Light>,
 }
 
-/// Reads the environment; `nits_per_unit` turns cd/m² into scene units, `notes` gets what was done to a picture's values.
+/// Reads the environment; `nits_per_unit` turns cd/m² into scene units, `notes` gets what was done to a picture's
+/// values.
 pub(super) fn read(
     value: &Value,
     folder: &Path,

@@ -13,7 +13,7 @@ use std::ops::Mul;
 pub(super) struct Combination<'a> {
     pub(super) parameters: &'a Parameters,
     pub(super) name: &'a str,
-    /// Of textures that use textures.
+    /// Depth of the texture in textures that use textures.
     pub(super) depth: usize,
 }
 

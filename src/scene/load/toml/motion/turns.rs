@@ -1,5 +1,6 @@
-//! Keyframes of objects, which turn as they are written: about one axis by the angle, however many turns that is; between different
-//! axes by slerp, which knows the short way alone, so that steps of half a turn and more are refused there.
+//! Keyframes of objects, which turn as they are written: about one axis by the angle, however many turns that is;
+//! between different axes by slerp, which knows the short way alone, so that steps of half a turn and more are refused
+//! there.
 
 use super::{Between, Keyframes, Turn, moving, scale, turn};
 use crate::scene::load::toml::fields::Value;
@@ -63,8 +64,8 @@ impl ObjectKey {
     }
 }
 
-/// How often the motion of each of so many objects with keyframes is cut at most: a pose takes about as much memory as all that a file
-/// says of a small object.
+/// How often the motion of each of so many objects with keyframes is cut at most: a pose takes about as much memory as
+/// all that a file says of a small object.
 pub(in crate::scene::load::toml) fn most_cuts(moving: usize) -> u32 {
     // 256 turns of an open shutter are a blur in which nobody can tell more.
     const OF_ONE: usize = 1023;
@@ -80,8 +81,9 @@ impl Keyframes<ObjectKey> {
         before.interpolate(after, share)
     }
 
-    /// Whether spheres placed by `before` stay spheres at all times. Between two keyframes the stretch S is linear in time, so that
-    /// how far SᵀS is from that of a sphere is quadratic: what is none at both ends and once between is none anywhere.
+    /// Whether spheres placed by `before` stay spheres at all times. Between two keyframes the stretch S is linear
+    /// in time, so that how far SᵀS is from that of a sphere is quadratic: what is none at both ends and once
+    /// between is none anywhere.
     pub(in crate::scene::load::toml) fn leave_spheres(&self, before: Affine3A) -> bool {
         let is_sphere = |pose: Pose| shapes::similarity_scale(&(pose.to_affine() * before)).is_some();
         self.frames.iter().all(|(_, key)| is_sphere(key.pose))
@@ -93,9 +95,9 @@ impl Keyframes<ObjectKey> {
         self.pose(time).to_affine()
     }
 
-    /// The motion of something placed by `before` while the shutter is open, cut at most so often between keyframes ([`most_cuts`]):
-    /// fast turns have fewer cuts then, slow ones keep theirs, or they would go the wrong way.
-    /// `None` where it rests.
+    /// The motion of something placed by `before` while the shutter is open, cut at most so often between
+    /// keyframes ([`most_cuts`]): fast turns have fewer cuts then, slow ones keep theirs, or they would go the
+    /// wrong way. `None` where it rests.
     pub(in crate::scene::load::toml) fn motion(
         &self,
         before: Affine3A,
