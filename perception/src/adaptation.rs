@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::filter::gaussian_blur_xy;
 use crate::glare;
 use crate::plane::Plane;
-use crate::sensitivity::LEAST_ADAPTATION_CD_M2;
+use crate::sensitivity::MIN_ADAPTATION_CD_M2;
 use crate::threshold::POOLING_SIGMA_DEG;
 
 /// How luminances are averaged.
@@ -44,8 +44,8 @@ pub fn local_adaptation_cd_m2(luminance_cd_m2: &Plane, display: &Display, mean: 
         Mean::Arithmetic => local_adaptation(luminance_cd_m2, display),
         Mean::Geometric => {
             // The logarithm of the floor is the origin: the blur wants no negative numbers.
-            let logs = luminance_cd_m2.map(|value| (value.max(LEAST_ADAPTATION_CD_M2) / LEAST_ADAPTATION_CD_M2).ln());
-            blurred(&logs, display).map(|log| log.exp() * LEAST_ADAPTATION_CD_M2)
+            let logs = luminance_cd_m2.map(|value| (value.max(MIN_ADAPTATION_CD_M2) / MIN_ADAPTATION_CD_M2).ln());
+            blurred(&logs, display).map(|log| log.exp() * MIN_ADAPTATION_CD_M2)
         }
     })
 }
@@ -64,7 +64,7 @@ pub(crate) fn adapted(luminance_cd_m2: &Plane, viewing: &Viewing) -> Plane {
 /// Adaptation luminance: see [`crate::threshold_map`].
 fn local_adaptation(luminance_cd_m2: &Plane, display: &Display) -> Plane {
     let mut adaptation = blurred(&without_fireflies(luminance_cd_m2), display);
-    adaptation.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = value.max(LEAST_ADAPTATION_CD_M2)));
+    adaptation.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = value.max(MIN_ADAPTATION_CD_M2)));
     adaptation
 }
 

@@ -46,7 +46,7 @@ pub struct AllocationProblem<'a> {
 pub const FINE_GAP: f64 = 3e-3;
 
 /// Least step of the search for a budget's log visibility until it has come from both sides; doubled each time.
-const LEAST_STEP: f64 = 0.25;
+const MIN_STEP: f64 = 0.25;
 
 /// Sample counts, and how far from the best they can at most be.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,18 +106,18 @@ pub fn allocate(problem: &AllocationProblem<'_>) -> Result<Allocation, Error> {
 const FARTHEST: f64 = 20.7;
 
 /// Share of the budget that counts as all of it.
-const LEAST_SPENT: f64 = 0.99;
+const MIN_SPENT: f64 = 0.99;
 
 /// Visibilities that the search tries at most. Eight doubled steps cross all that there are; the others are for brackets. A search that is
 /// not done then ends with the best that it has.
-const MOST_ROUNDS: u32 = 40;
+const MAX_ROUNDS: u32 = 40;
 
-/// Width of a bracket of log visibility at which the search ends though less than [`LEAST_SPENT`] of the budget is spent: cost goes as v⁻²,
+/// Width of a bracket of log visibility at which the search ends though less than [`MIN_SPENT`] of the budget is spent: cost goes as v⁻²,
 /// so that 0.02 % of it is left to be found, and what jumps within is limits.
 const NARROWEST_BRACKET: f64 = 1e-4;
 
 /// Share of a bracket that goes in every round at least, wherever the aim is.
-const LEAST_CUT: f64 = 0.1;
+const MIN_CUT: f64 = 0.1;
 
 /// Share by which rounding may bring the sum of the fewest counts over the cheapest cost.
 const ROUNDING: f64 = 1e-9;
@@ -138,13 +138,13 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
     // Bracket of log visibility; cost falls as visibility rises.
     let (mut too_dear, mut affordable) = (f64::NEG_INFINITY, f64::INFINITY);
     let mut best: Option<Allocation> = None;
-    let mut least_step = LEAST_STEP;
-    for _ in 0..MOST_ROUNDS {
+    let mut least_step = MIN_STEP;
+    for _ in 0..MAX_ROUNDS {
         let found = solver.solve(visibility, &mut multipliers);
         let excess = found.cost / budget;
         if excess <= 1.0 {
             affordable = visibility.ln();
-            let enough = excess > LEAST_SPENT;
+            let enough = excess > MIN_SPENT;
             if best.as_ref().is_none_or(|best| best.visibility > visibility) {
                 best = Some(found);
             }
@@ -160,12 +160,12 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
             }
         }
         // Without limits cost goes as v⁻²; aim amid what is enough.
-        let aimed = visibility.ln() + 0.5 * (excess / (0.5 * (LEAST_SPENT + 1.0))).ln();
+        let aimed = visibility.ln() + 0.5 * (excess / (0.5 * (MIN_SPENT + 1.0))).ln();
         let next = if too_dear.is_finite() && affordable.is_finite() {
             if affordable - too_dear < NARROWEST_BRACKET {
                 break;
             }
-            let margin = LEAST_CUT * (affordable - too_dear);
+            let margin = MIN_CUT * (affordable - too_dear);
             aimed.clamp(too_dear + margin, affordable - margin)
         } else {
             // Limits make the cost respond less than the law says, and far from the answer not at all: ever greater steps.

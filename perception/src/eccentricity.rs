@@ -49,7 +49,7 @@ pub const GAZE_MARGIN_DEG: f64 = 1.0;
 /// Eccentricities beyond are taken as this, degrees: about where castleCSF's data end.
 const FARTHEST_DEG: f64 = 60.0;
 /// Steps a degree of tables.
-const STEPS_A_DEGREE: f64 = 4.0;
+const STEPS_PER_DEGREE: f64 = 4.0;
 
 /// e₀ in 1/deg and e₁ in 1/(deg cpd), decades of sensitivity.
 struct Decline {
@@ -157,12 +157,12 @@ impl EnergyTable {
             let at = |&(freq, energy): &(f64, f64)| energy * sensitivity_left(channel, freq, eccentricity).powi(2);
             if whole > 0.0 { rings.iter().map(at).sum::<f64>() / whole } else { 1.0 }
         };
-        let steps = (FARTHEST_DEG * STEPS_A_DEGREE) as u32;
-        Self(UniformTable::new((0..=steps).map(|step| left(f64::from(step) / STEPS_A_DEGREE) as f32)))
+        let steps = (FARTHEST_DEG * STEPS_PER_DEGREE) as u32;
+        Self(UniformTable::new((0..=steps).map(|step| left(f64::from(step) / STEPS_PER_DEGREE) as f32)))
     }
 
     fn at(&self, eccentricity_deg: f32) -> f32 {
-        self.0.at(eccentricity_deg * STEPS_A_DEGREE as f32)
+        self.0.at(eccentricity_deg * STEPS_PER_DEGREE as f32)
     }
 }
 

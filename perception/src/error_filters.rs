@@ -8,7 +8,7 @@ use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
 
 /// An error of this many times the adaptation luminance is hopelessly visible; more would only cost the rest of the
 /// transform its precision, and counts by its logarithm ([`compressed`]).
-pub(crate) const LARGEST_RELATIVE_ERROR: f32 = 1e3;
+pub(crate) const MAX_RELATIVE_ERROR: f32 = 1e3;
 /// Standard deviation of what counts as slow at a picture's border, degrees: as wide as it may be before gradients have
 /// edges at borders, which they have from 2° on (waves of 2 % over some 5° are at 0.73, not 0.66). Measured on 256×256
 /// pixels at 60 a degree, v of a square of 9 and of 31 pixels in a corner, half brighter: amid equal pictures 14.40 and
@@ -57,16 +57,16 @@ impl BandResponse {
     }
 }
 
-/// An error over the adaptation luminance up to [`LARGEST_RELATIVE_ERROR`], and beyond it what grows with its
+/// An error over the adaptation luminance up to [`MAX_RELATIVE_ERROR`], and beyond it what grows with its
 /// logarithm: cut off there, a texture would be one value all over, which nobody sees. Measured on a texture of 50 to
 /// 100 cd/m² on black: cut off, v 0.00, and 47.6 for a tenth of it.
 fn compressed(error: f32, adaptation: f32) -> f32 {
     let relative = error / adaptation;
-    if relative.abs() <= LARGEST_RELATIVE_ERROR {
+    if relative.abs() <= MAX_RELATIVE_ERROR {
         return relative;
     }
-    let excess = f64::from(error.abs()) / f64::from(LARGEST_RELATIVE_ERROR * adaptation);
-    (LARGEST_RELATIVE_ERROR * (1.0 + excess.ln() as f32)).copysign(error)
+    let excess = f64::from(error.abs()) / f64::from(MAX_RELATIVE_ERROR * adaptation);
+    (MAX_RELATIVE_ERROR * (1.0 + excess.ln() as f32)).copysign(error)
 }
 
 impl<'a> ErrorFilters<'a> {

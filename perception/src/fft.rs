@@ -9,7 +9,7 @@ use rustfft::{Fft, FftPlanner};
 
 use crate::display::PixelDensity;
 use crate::filter::reflect;
-use crate::frame::{Frame, MOST_REDUCTION};
+use crate::frame::{Frame, MAX_REDUCTION};
 use crate::plane::Plane;
 
 /// Mirror on each side of a picture, degrees. The transform is periodic, so that a border's error reaches the opposite border across
@@ -18,7 +18,7 @@ use crate::plane::Plane;
 /// 2.3 times at 3°; at 2° the leak is 0.5 % of what is seen where the error stands.
 const MIRROR_DEG: f64 = 2.0;
 /// The least, degrees, for pictures that are shorter than twice this.
-const LEAST_MIRROR_DEG: f64 = 1.0;
+const MIN_MIRROR_DEG: f64 = 1.0;
 
 /// The transform of one picture size. Making one is cheap: plans are kept for the life of the program.
 pub(crate) struct PictureTransform {
@@ -89,7 +89,7 @@ impl PictureTransform {
     /// The transform for pictures of `width` × `height` pixels, mirrored by [`MIRROR_DEG`] on every side or by half of
     /// a shorter picture: then nothing is nearer across the seam of the period than it is in the picture itself.
     pub(crate) fn new(width: usize, height: usize, density: PixelDensity) -> Self {
-        let padded = |len: usize, pad: usize| MOST_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MOST_REDUCTION));
+        let padded = |len: usize, pad: usize| MAX_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MAX_REDUCTION));
         let (pad_x, pad_y) = (mirror_px(width, density.horizontal), mirror_px(height, density.vertical));
         let (padded_width, padded_height) = (padded(width, pad_x), padded(height, pad_y));
         let mut planners = planners();
@@ -268,7 +268,7 @@ impl PictureTransform {
 /// same pixels.
 fn mirror_px(len: usize, pixels_per_degree: f64) -> usize {
     let pixels = |degrees: f64| ((degrees * pixels_per_degree).ceil() as usize).max(1);
-    len.div_ceil(2).clamp(pixels(LEAST_MIRROR_DEG), pixels(MIRROR_DEG)).next_multiple_of(MOST_REDUCTION)
+    len.div_ceil(2).clamp(pixels(MIN_MIRROR_DEG), pixels(MIRROR_DEG)).next_multiple_of(MAX_REDUCTION)
 }
 
 /// The first `len` bins of a buffer that grows to them.

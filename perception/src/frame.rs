@@ -5,7 +5,7 @@ use crate::filter::reflect;
 use crate::plane::Plane;
 
 /// The largest factor.
-pub(crate) const MOST_REDUCTION: usize = 16;
+pub(crate) const MAX_REDUCTION: usize = 16;
 
 /// Where the samples of a reduced picture stand: at every `factor`-th pixel, from one sample before the picture on until at least
 /// one past it, and so many more on each side as `beside` and `above` say.
@@ -60,7 +60,7 @@ pub(crate) fn reduced_pixel(index: usize, factor: usize, len: usize) -> usize {
 /// The largest reduction that still samples frequencies up to `limit_cpd` along both axes.
 pub(crate) fn reduction(density: PixelDensity, limit_cpd: f64) -> usize {
     let mut factor = 1;
-    while factor < MOST_REDUCTION && density.coarsest() / (4 * factor) as f64 >= limit_cpd {
+    while factor < MAX_REDUCTION && density.coarsest() / (4 * factor) as f64 >= limit_cpd {
         factor *= 2;
     }
     factor

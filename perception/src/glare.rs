@@ -23,9 +23,9 @@ const VALID_DEG: std::ops::Range<f64> = 0.1..100.0;
 /// Pigment of the eye: 0 for black, 0.5 for brown, 1.2 for light blue eyes.
 const PIGMENT: f64 = 0.5;
 /// Light is gathered in cells of this fraction of a degree: the veil changes no faster than that.
-const CELLS_A_DEGREE: f64 = 8.0;
+const CELLS_PER_DEGREE: f64 = 8.0;
 /// However large the picture, no more cells than these along a side.
-const MOST_CELLS: usize = 1024;
+const MAX_CELLS: usize = 1024;
 
 /// Veil in cd/m² that an illuminance of 1 lx from `angle_deg` off the line of sight lays over it.
 ///
@@ -54,7 +54,7 @@ pub(crate) fn veil_cd_m2(luminance_cd_m2: &Plane, adaptation_cd_m2: &Plane, view
     let density = viewing.display.pixel_density();
     let (width, height) = (luminance_cd_m2.width(), luminance_cd_m2.height());
     let cell = [(density.horizontal, width), (density.vertical, height)].map(|(pixels_per_degree, len)| {
-        ((pixels_per_degree / CELLS_A_DEGREE) as usize).max(len.div_ceil(MOST_CELLS)).max(1)
+        ((pixels_per_degree / CELLS_PER_DEGREE) as usize).max(len.div_ceil(MAX_CELLS)).max(1)
     });
     let cells = (width.div_ceil(cell[0]), height.div_ceil(cell[1]));
     // Real part: light over its mean; imaginary part: area. One complex transform convolves both, and each leaks into the other by

@@ -145,5 +145,5 @@ pub mod visibility;
 pub use csf::{CastleCsf, ContrastSensitivity};
 pub use display::{Display, Eotf, Observer, Viewing};
 pub use error::Error;
-pub use plane::{PIXELS_A_TASK, Plane};
+pub use plane::{PIXELS_PER_TASK, Plane};
 pub use threshold::{GuideNoise, ThresholdInputs, ThresholdMap, threshold_map};

@@ -8,7 +8,7 @@ use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::csf::ContrastSensitivity;
 use crate::display::PixelDensity;
 use crate::fft::{PictureTransform, Spectrum, Workspace};
-use crate::frame::{Frame, MOST_REDUCTION, reduced_size, reduction};
+use crate::frame::{Frame, MAX_REDUCTION, reduced_size, reduction};
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
 use crate::sensitivity::BandTables;
@@ -233,7 +233,7 @@ pub(crate) fn halvings(plane: &Plane) -> Vec<Plane> {
     let (width, height) = (plane.width(), plane.height());
     let mut planes: Vec<Plane> = Vec::new();
     let mut factor = 1;
-    while factor <= MOST_REDUCTION {
+    while factor <= MAX_REDUCTION {
         // The window wants one sample more on each side of the frame.
         let frame = Frame { factor, beside: 2, above: 2 };
         let (columns, finer) = (frame.columns(width), planes.last().unwrap_or(plane));

@@ -16,10 +16,10 @@ pub struct Plane {
 }
 
 /// Luminance above which nothing is answered: sums over windows must stay within `f32`.
-const LARGEST_LUMINANCE_CD_M2: f32 = 1e30;
+const MAX_LUMINANCE_CD_M2: f32 = 1e30;
 
 /// Pixels that are worth handing to another thread. Measured at 128×128 pixels: 16,384 leave a second core idle.
-pub const PIXELS_A_TASK: usize = 1 << 12;
+pub const PIXELS_PER_TASK: usize = 1 << 12;
 
 impl Plane {
     /// A plane whose every pixel is `value`.
@@ -206,7 +206,7 @@ impl Plane {
             return;
         }
         // A few rows at a time: one row of a small picture is less work than handing it over.
-        let rows_at_once = (PIXELS_A_TASK / self.width).max(1);
+        let rows_at_once = (PIXELS_PER_TASK / self.width).max(1);
         let width = self.width;
         self.values.par_chunks_mut(width * rows_at_once).enumerate().for_each(|(chunk, rows)| {
             for (offset, row) in rows.chunks_exact_mut(width).enumerate() {
@@ -239,7 +239,7 @@ impl Plane {
 
     /// Rejects the same, and luminance in cd/m² whose means would not be finite.
     pub(crate) fn check_luminance(&self, what: &'static str) -> Result<(), Error> {
-        self.check_at_most(LARGEST_LUMINANCE_CD_M2, what)
+        self.check_at_most(MAX_LUMINANCE_CD_M2, what)
     }
 
     fn check_at_most(&self, largest: f32, what: &'static str) -> Result<(), Error> {

@@ -1,6 +1,6 @@
 //! A picture of several channels, row by row: all of a row's channels lie one after the other.
 
-use crate::plane::PIXELS_A_TASK;
+use crate::plane::PIXELS_PER_TASK;
 use rayon::prelude::*;
 
 /// Columns to each side of the picture that may be read, so that the widest filter needs no other loop at its edges.
@@ -53,7 +53,7 @@ impl<const CHANNELS: usize> Rows<CHANNELS> {
     /// Runs `work(y, channels of row y)` over all rows in parallel.
     pub(crate) fn for_each_row(&mut self, work: impl Fn(usize, [&mut [f32]; CHANNELS]) + Sync) {
         let (width, stride) = (self.width, self.stride);
-        let rows_at_once = (PIXELS_A_TASK / width.max(1)).max(1);
+        let rows_at_once = (PIXELS_PER_TASK / width.max(1)).max(1);
         self.values.par_chunks_mut(CHANNELS * stride).with_min_len(rows_at_once).enumerate().for_each(|(y, row)| {
             let mut channels = row.chunks_exact_mut(stride).map(|channel| &mut channel[BORDER..BORDER + width]);
             // There are exactly as many as channels; an empty slice never comes up.

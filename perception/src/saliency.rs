@@ -189,7 +189,7 @@ fn promoted(map: &Plane) -> Plane {
 /// Local maxima below this share of the greatest are none: where nothing happens they are rounding's.
 const LEAST_MAXIMUM: f32 = 0.1;
 /// A maximum from which a higher one is reached without going down by this share of the greatest is a part of that one.
-const LEAST_DESCENT: f32 = 0.01;
+const MIN_DESCENT: f32 = 0.01;
 
 /// (M − m)² of a map scaled to M = 1.
 fn promotion(scaled: &Plane) -> f32 {
@@ -222,7 +222,7 @@ fn local_maxima(scaled: &Plane) -> Vec<f32> {
     maxima
 }
 
-/// What lies around a peak and at most [`LEAST_DESCENT`] below it; `None` if something higher does.
+/// What lies around a peak and at most [`MIN_DESCENT`] below it; `None` if something higher does.
 fn plateau_of(scaled: &Plane, peak: usize) -> Option<Vec<usize>> {
     let values = scaled.values();
     let mut is_seen = vec![false; values.len()];
@@ -234,7 +234,7 @@ fn plateau_of(scaled: &Plane, peak: usize) -> Option<Vec<usize>> {
             if values[other] > values[peak] {
                 return None;
             }
-            if !is_seen[other] && values[other] >= values[peak] - LEAST_DESCENT {
+            if !is_seen[other] && values[other] >= values[peak] - MIN_DESCENT {
                 is_seen[other] = true;
                 plateau.push(other);
             }

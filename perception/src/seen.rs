@@ -13,7 +13,7 @@ use crate::csf::ChromaticChannel;
 use crate::display::Display;
 use crate::opponent::{OPPONENT_OF_RGB, Opponent};
 use crate::photometry::REC709_WEIGHTS;
-use crate::plane::{PIXELS_A_TASK, Plane};
+use crate::plane::{PIXELS_PER_TASK, Plane};
 use crate::tone::{FittedTone, Pixel};
 use bent::variances_of_colour;
 use rayon::prelude::*;
@@ -118,7 +118,7 @@ pub fn display_opponent_variances(
     let shown = NoiseShown::new(fitted, display);
     let found: Vec<[f32; 3]> = (0..width * height)
         .into_par_iter()
-        .with_min_len(PIXELS_A_TASK)
+        .with_min_len(PIXELS_PER_TASK)
         .map(|index| {
             let at = |plane: &Plane| plane.values()[index];
             let pixel = Pixel { x: index % width, y: index / width };

@@ -8,14 +8,14 @@ use crate::table::UniformTable;
 use rayon::prelude::*;
 
 /// Luminances below this, cd/m², adapt the eye no further (the floor of vision).
-pub(crate) const LEAST_ADAPTATION_CD_M2: f32 = 1e-4;
+pub(crate) const MIN_ADAPTATION_CD_M2: f32 = 1e-4;
 
 const LOWEST_DECADE: i32 = -4;
 const HIGHEST_DECADE: i32 = 6;
 /// Entries a decade of the finished tables.
-const ENTRIES_A_DECADE: usize = 64;
+const ENTRIES_PER_DECADE: usize = 64;
 /// Luminances a decade at which the CSF is asked; between them tables are straight in logs.
-const SAMPLES_A_DECADE: usize = 4;
+const SAMPLES_PER_DECADE: usize = 4;
 
 /// A quantity against adaptation luminance.
 #[derive(Clone, Debug)]
@@ -25,15 +25,15 @@ impl LuminanceTable {
     /// `value_at(index)` gives the value at sample `index` of the grid; beyond the span the table is flat.
     fn from_samples(span: LuminanceSpan, value_at: impl Fn(usize) -> f64) -> Self {
         let entry_at = |entry: usize| {
-            let position = entry as f64 * SAMPLES_A_DECADE as f64 / ENTRIES_A_DECADE as f64;
+            let position = entry as f64 * SAMPLES_PER_DECADE as f64 / ENTRIES_PER_DECADE as f64;
             let below = (position as usize).min(span.last - 1);
             let (low, high) = (value_at(below).max(1e-30), value_at(below + 1).max(1e-30));
             (low.ln() + (position - below as f64) * (high / low).ln()).exp() as f32
         };
-        let [first, last] = [span.first, span.last].map(|sample| sample * ENTRIES_A_DECADE / SAMPLES_A_DECADE);
+        let [first, last] = [span.first, span.last].map(|sample| sample * ENTRIES_PER_DECADE / SAMPLES_PER_DECADE);
         let known: Vec<f32> = (first..=last).map(entry_at).collect();
         let decades = (HIGHEST_DECADE - LOWEST_DECADE) as usize;
-        let entries = (0..=decades * ENTRIES_A_DECADE).map(|entry| known[entry.clamp(first, last) - first]);
+        let entries = (0..=decades * ENTRIES_PER_DECADE).map(|entry| known[entry.clamp(first, last) - first]);
         Self(UniformTable::new(entries))
     }
 
@@ -46,8 +46,8 @@ impl LuminanceTable {
 /// Where a luminance stands in every [`LuminanceTable`].
 pub(crate) fn luminance_coordinate(luminance_cd_m2: f32) -> f32 {
     const DECADES_AN_OCTAVE: f32 = std::f32::consts::LOG10_2;
-    let decades = DECADES_AN_OCTAVE * log2(luminance_cd_m2.max(LEAST_ADAPTATION_CD_M2));
-    ((decades - LOWEST_DECADE as f32) * ENTRIES_A_DECADE as f32).max(0.0)
+    let decades = DECADES_AN_OCTAVE * log2(luminance_cd_m2.max(MIN_ADAPTATION_CD_M2));
+    ((decades - LOWEST_DECADE as f32) * ENTRIES_PER_DECADE as f32).max(0.0)
 }
 
 /// Binary logarithm of a positive, normal number, off by less than 1e-6 beside rounding, without a call: every pixel of every
@@ -75,9 +75,9 @@ pub(crate) struct LuminanceSpan {
 impl LuminanceSpan {
     /// What encloses all pixels of some adaptation luminances, cd/m².
     pub(crate) fn of<'a>(adaptations_cd_m2: impl IntoIterator<Item = &'a Plane>) -> Self {
-        let most = (HIGHEST_DECADE - LOWEST_DECADE) as usize * SAMPLES_A_DECADE;
+        let most = (HIGHEST_DECADE - LOWEST_DECADE) as usize * SAMPLES_PER_DECADE;
         let sample = |luminance_cd_m2: f32| {
-            luminance_coordinate(luminance_cd_m2) * SAMPLES_A_DECADE as f32 / ENTRIES_A_DECADE as f32
+            luminance_coordinate(luminance_cd_m2) * SAMPLES_PER_DECADE as f32 / ENTRIES_PER_DECADE as f32
         };
         let (mut first, mut last) = (most, 0);
         for adaptation in adaptations_cd_m2 {
@@ -92,7 +92,7 @@ impl LuminanceSpan {
 
     /// In cd/m², by sample.
     fn luminances(self) -> impl Iterator<Item = f64> {
-        let decade = |sample: usize| f64::from(LOWEST_DECADE) + sample as f64 / SAMPLES_A_DECADE as f64;
+        let decade = |sample: usize| f64::from(LOWEST_DECADE) + sample as f64 / SAMPLES_PER_DECADE as f64;
         (self.first..=self.last).map(move |sample| 10.0_f64.powf(decade(sample)))
     }
 }
@@ -212,7 +212,7 @@ pub(crate) fn adaptation_levels(
     least_cd_m2: f32,
     greatest_cd_m2: f32,
 ) -> Vec<AdaptationLevel> {
-    let half_decade = |luminance: f32| 2.0 * f64::from(luminance.max(LEAST_ADAPTATION_CD_M2)).log10();
+    let half_decade = |luminance: f32| 2.0 * f64::from(luminance.max(MIN_ADAPTATION_CD_M2)).log10();
     // A luminance within a millionth of a level is that level: no second transform for rounding.
     let highest = 2 * HIGHEST_DECADE + 20;
     let first = ((half_decade(least_cd_m2) + 1e-6).floor() as i32).min(highest);

@@ -5,11 +5,11 @@ use crate::filter::{self, reflect};
 use crate::plane::Plane;
 
 /// Beyond this variance, in samples, the box filters of [`filter::gaussian_blur_xy`] take over.
-const MOST_VARIANCE: f64 = 3.0;
+const MAX_VARIANCE: f64 = 3.0;
 
 /// `plane` through a window of the given variances along x and y, in squared samples, mirrored at the borders.
 pub(crate) fn smoothed(plane: &Plane, variance_x: f64, variance_y: f64) -> Plane {
-    if variance_x.max(variance_y) > MOST_VARIANCE {
+    if variance_x.max(variance_y) > MAX_VARIANCE {
         return filter::gaussian_blur_xy(plane, [variance_x, variance_y].map(|variance| variance.max(0.0).sqrt()));
     }
     let (across, down) = (kernel(variance_x), kernel(variance_y));

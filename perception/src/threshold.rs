@@ -197,7 +197,7 @@ const FEW_PIXELS: usize = 1 << 16;
 /// cost the rest of the transform its precision. Measured without it, beside a lone lamp of 1e5 × white: rounding
 /// raises thresholds threefold all over the picture. Shown pictures stay below: a night view with lamps of 1000 × its
 /// black reaches 25.
-const LARGEST_MASK_CONTRAST: f32 = 30.0;
+const MAX_MASK_CONTRAST: f32 = 30.0;
 
 /// Who looks, and what is tabulated of it.
 struct Eye<'a> {
@@ -224,7 +224,7 @@ fn masked(
     let contrast = transform.forward(&mut workspace, |y, row| {
         for (value, (signal, adaptation)) in row.iter_mut().zip(signal_cd_m2.row(y).iter().zip(adaptation_cd_m2.row(y)))
         {
-            *value = (signal / adaptation - mean).clamp(-LARGEST_MASK_CONTRAST, LARGEST_MASK_CONTRAST);
+            *value = (signal / adaptation - mean).clamp(-MAX_MASK_CONTRAST, MAX_MASK_CONTRAST);
         }
     });
     let (least, greatest) = adaptation_cd_m2.range();

@@ -17,7 +17,7 @@ import numpy as np
 import fechner
 
 MEAN_CD_M2 = 80.0
-LEAST_CONTRAST, GREATEST_CONTRAST = 1e-3, 0.5
+MIN_CONTRAST, GREATEST_CONTRAST = 1e-3, 0.5
 
 
 def chart(viewing, frequencies_cpd, height):
@@ -25,7 +25,7 @@ def chart(viewing, frequencies_cpd, height):
     pixels_per_degree = viewing.display.pixels_per_degree
     # Phase is the integral of frequency over the place.
     phase = 2 * np.pi * np.cumsum(frequencies_cpd) / pixels_per_degree
-    contrasts = np.geomspace(LEAST_CONTRAST, GREATEST_CONTRAST, height)
+    contrasts = np.geomspace(MIN_CONTRAST, GREATEST_CONTRAST, height)
     return contrasts[:, None] * np.cos(phase), contrasts
 
 

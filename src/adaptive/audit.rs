@@ -10,7 +10,7 @@ mod unproven;
 pub use unproven::audit_unproven;
 
 use super::beginning;
-use super::judge::{JudgeError, Judgement, still_wanted, variance_share};
+use super::judge::{JudgeError, Judgement, check_cancelled, variance_share};
 use super::plan::blocks_between;
 use super::settings::LoopSettings;
 use crate::film::{BlockSum, Film, HalfPixel, Halves};
@@ -26,12 +26,12 @@ const TILE: usize = 16;
 /// Tiles of which one is audited.
 const STRATUM: usize = 50;
 /// Fewer tiles' scatter says nothing of how sure the ratio is: two give −2.53 ± 0.24 on `cornell-glass`.
-const LEAST_TILES: usize = 6;
+const MIN_TILES: usize = 6;
 /// Keeps audits' random numbers apart from the picture's.
 const AUDIT_STREAM: u64 = 0x0041_5544_4954;
 
 /// What the variance may be multiplied by in all after audits that disagree.
-pub const MOST_INFLATION: f64 = 4.0;
+pub const MAX_INFLATION: f64 = 4.0;
 
 /// What an audit found.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,13 +67,13 @@ impl Audit {
 
 /// Whether a picture of these tiles is audited: of fewer than 150, the least number of tiles would cost too much.
 fn is_large_enough(all: &[Tile]) -> bool {
-    2 * all.len() >= LEAST_TILES * STRATUM
+    2 * all.len() >= MIN_TILES * STRATUM
 }
 
 /// Audits a film. `None` for pictures of fewer than 150 tiles.
 ///
 /// # Errors
-/// [`JudgeError::Outdated`] alone.
+/// [`JudgeError::Cancelled`] alone.
 pub fn audit(
     tracer: &PathTracer,
     film: &Film,
@@ -85,7 +85,7 @@ pub fn audit(
     if !is_large_enough(&all) {
         return Ok(None);
     }
-    let tiles = choose_tiles(&all, ((all.len() + STRATUM / 2) / STRATUM).max(LEAST_TILES), round);
+    let tiles = choose_tiles(&all, ((all.len() + STRATUM / 2) / STRATUM).max(MIN_TILES), round);
     let width = film.width() as usize;
     let pixels: Vec<usize> = tiles.iter().flat_map(|tile| tile.pixels(width)).collect();
     let fresh = FreshSamples::take(tracer, film, &pixels, 1, settings, round)?;
@@ -174,7 +174,7 @@ impl FreshSamples {
         round: u32,
     ) -> Result<Self, JudgeError> {
         /// Between two questions whether the audit is still wanted.
-        const SAMPLES_A_PIECE: u64 = 1 << 17;
+        const SAMPLES_PER_PIECE: u64 = 1 << 17;
         let plan = repetition(film, pixels, times);
         let seed = hash_words(tracer.settings().seed, AUDIT_STREAM + u64::from(round));
         let mut halves = vec![[HalfPixel::default(); 2]; pixels.len()];
@@ -188,8 +188,8 @@ impl FreshSamples {
         };
         let mut left = plan.blocks.as_slice();
         while !left.is_empty() {
-            still_wanted(settings)?;
-            let piece = beginning(left, SAMPLES_A_PIECE);
+            check_cancelled(settings)?;
+            let piece = beginning(left, SAMPLES_PER_PIECE);
             tracer.trace_into(&SamplePlan { blocks: piece.to_vec() }, seed, &mut merge, &|_| {});
             left = &left[piece.len()..];
         }

@@ -22,10 +22,10 @@ pub(super) const EVEN_ENOUGH: f64 = 0.95;
 /// have 9.875 JOD at 96 samples and uneven ones 9.834 (`benches/results/equal-time.md`).
 const EVEN_ENOUGH_WHILE_FAR: f64 = 0.97;
 /// Samples for every pixel up to which a plan is never cut: less would hardly pay for the look before it.
-const LEAST_UNCUT: f64 = 16.0;
+const MIN_UNCUT: f64 = 16.0;
 /// No pixel's noise counts as more than so many times the picture's mean: variances of few samples are not worth more
 /// trust.
-const MOST_TIMES_MEAN: f64 = 16.0;
+const MAX_TIMES_MEAN: f64 = 16.0;
 
 /// The part of a plan that is worth its samples before the next look: where it does most for the picture.
 pub(super) fn most_worthwhile(plan: SamplePlan, film: &Film, judgement: &Judgement) -> SamplePlan {
@@ -35,7 +35,7 @@ pub(super) fn most_worthwhile(plan: SamplePlan, film: &Film, judgement: &Judgeme
 /// Samples of a plan before the next look.
 fn most_at_once(film: &Film) -> u64 {
     let pixels = film.pixel_count() as f64;
-    (GROWTH * film.total_samples() as f64).max(LEAST_UNCUT * pixels) as u64
+    (GROWTH * film.total_samples() as f64).max(MIN_UNCUT * pixels) as u64
 }
 
 /// Samples for a rung that is far nearly everywhere: where they do most for the picture among what shows by itself.
@@ -150,7 +150,7 @@ pub(super) fn defended(energies: &[f32]) -> Vec<f64> {
     let energies = || energies.iter().map(|&energy| f64::from(energy));
     let mean = energies().filter(|energy| energy.is_finite()).sum::<f64>() / energies().len().max(1) as f64;
     // The order of `min` turns NaN into the most.
-    energies().map(|energy| energy.min(MOST_TIMES_MEAN * mean) + mean).collect()
+    energies().map(|energy| energy.min(MAX_TIMES_MEAN * mean) + mean).collect()
 }
 
 #[cfg(test)]

@@ -19,11 +19,11 @@ const LONGEST_SIDE: u32 = 256;
 /// Samples of a glimpse, about.
 const SAMPLES: u32 = 1 << 17;
 /// Most samples of one that goes on until it is steady: 2.5 s of a box on two cores.
-const MOST_SAMPLES: u64 = 1 << 20;
+const MAX_SAMPLES: u64 = 1 << 20;
 /// Longest side in pixels of a coarse glimpse, and its most samples: with 512 a pixel of a picture of 64×36 eyes in
 /// `scenes/theatre-door.toml` adapt as with 512 a pixel of one of 128×72, to 3 %.
 const COARSE_SIDE: u32 = 64;
-const MOST_COARSE_SAMPLES: u64 = 1 << 21;
+const MAX_COARSE_SAMPLES: u64 = 1 << 21;
 /// A brief glimpse's side is at most this share of the picture's: it takes a sample for each of the picture's pixels.
 const SIDES_OF_A_BRIEF_GLIMPSE: u32 = 4;
 /// Change of light by a doubling of the samples below which it is.
@@ -46,7 +46,7 @@ pub fn steady_glimpse_for(
     made_of_it: &dyn Fn(&SceneLight) -> Vec<f32>,
 ) -> (SceneLight, f32) {
     let tracer = PathTracer::new(scene, small(trace));
-    steady_light_for(operator, &tracer, nits_per_unit, MOST_SAMPLES, made_of_it)
+    steady_light_for(operator, &tracer, nits_per_unit, MAX_SAMPLES, made_of_it)
 }
 
 /// A steady glimpse as [`steady_glimpse_for`] takes it, with fewer pixels and up to thirty times as many samples in
@@ -60,7 +60,7 @@ pub fn coarse_glimpse_for(
     made_of_it: &dyn Fn(&SceneLight) -> Vec<f32>,
 ) -> SceneLight {
     let tracer = PathTracer::new(scene, no_longer_than(COARSE_SIDE, trace));
-    steady_light_for(operator, &tracer, nits_per_unit, MOST_COARSE_SAMPLES, made_of_it).0
+    steady_light_for(operator, &tracer, nits_per_unit, MAX_COARSE_SAMPLES, made_of_it).0
 }
 
 /// What one operator asks for as a few pixels see it, however noisy: for telling which of many views are lighter.
@@ -109,7 +109,7 @@ fn pilot(tracer: &PathTracer) -> Film {
 }
 
 fn steady_light(tracer: &PathTracer, nits_per_unit: f64) -> SceneLight {
-    let Seen { rgb_cd_m2, alpha } = Steady::of(tracer, nits_per_unit, MOST_SAMPLES, &|_| Vec::new()).seen;
+    let Seen { rgb_cd_m2, alpha } = Steady::of(tracer, nits_per_unit, MAX_SAMPLES, &|_| Vec::new()).seen;
     where_covered(SceneLight::with_rods(tracer.settings().width as usize, &rgb_cd_m2), alpha.as_deref())
 }
 
@@ -242,7 +242,7 @@ mod tests {
         }
         let of_film = |film: &Film| levels(&guide_rgb(film, &film.estimate(scene.nits_per_unit)))[1];
         let (right, few) = (of_film(&film), of_film(&pilot(&tracer)));
-        let steady = Steady::of(&tracer, scene.nits_per_unit, MOST_SAMPLES, &|_| Vec::new());
+        let steady = Steady::of(&tracer, scene.nits_per_unit, MAX_SAMPLES, &|_| Vec::new());
         let steady = levels(&steady.seen.rgb_cd_m2)[1];
         // Of six seeds with the 64 samples that it ends with white scatters by 2.6 %: three deviations from one
         // with 128.

@@ -70,9 +70,9 @@ pub enum JudgeError {
     /// Perception failed on a picture that the loop made: a defect of ours, with the reason.
     #[error("the threshold map could not be made: {0}")]
     Perception(#[from] fechner_perception::Error),
-    /// [`LoopSettings::is_outdated`] said so.
+    /// [`LoopSettings::is_cancelled`] said so.
     #[error("the look was interrupted")]
-    Outdated,
+    Cancelled,
     /// The denoiser failed.
     #[error(transparent)]
     Denoiser(#[from] OidnError),
@@ -114,7 +114,7 @@ enum Purpose {
 
 /// The shorter side, pixels, from which the difference of a denoised picture's halves tells what noise is left: below it is judged as the
 /// raw mean. A crop of one pixel at 4 samples was called perfect, and was wrong by 32 thresholds.
-const LEAST_SIDE_OF_HALVES: u32 = 8;
+const MIN_SIDE_OF_HALVES: u32 = 8;
 
 fn judge_by(
     denoiser: Option<&Denoiser>,
@@ -129,10 +129,10 @@ fn judge_by(
     let raw_inflation = if denoised.is_some() { 1.0 } else { inflation };
 
     let guide = Guide::of(film, &estimate, denoised.as_ref(), settings);
-    still_wanted(settings)?;
+    check_cancelled(settings)?;
     let tone = guide.tone(settings);
     let scatter = Scatter::of(film, &guide, tone.as_ref(), settings, raw_inflation);
-    still_wanted(settings)?;
+    check_cancelled(settings)?;
     let displayed_guide = guide.displayed(tone.as_ref(), settings);
     let noise = scatter.luminance_variance_of_mean();
     let thresholds = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
@@ -140,7 +140,7 @@ fn judge_by(
         None => None,
         Some(_) => thresholds_of_still(&displayed_guide, tone.as_ref(), &noise, settings)?,
     };
-    still_wanted(settings)?;
+    check_cancelled(settings)?;
     let sources = Sources {
         film,
         guide: &guide,
@@ -154,14 +154,14 @@ fn judge_by(
         None => PerSample::of_raw(&sources, purpose)?,
         Some(_) => PerSample::of_denoised(&sources, purpose)?,
     };
-    still_wanted(settings)?;
+    check_cancelled(settings)?;
     let over_white = if settings.is_transparent {
         let colour_scale = denoised.is_none().then(|| scatter.luminance_scale());
         Some(OverWhite::of(film, &guide, &displayed_guide, colour_scale, tone.as_ref(), settings, purpose)?)
     } else {
         None
     };
-    still_wanted(settings)?;
+    check_cancelled(settings)?;
     let look = Look { started, film, settings, estimate, tone, scatter, thresholds, of_still, per_sample, over_white };
     look.finished(denoised, inflation)
 }
@@ -186,7 +186,7 @@ impl Look<'_> {
     fn finished(self, denoised: Option<TimedDenoising>, inflation: f64) -> Result<Judgement, JudgeError> {
         let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
         let denoised = denoised.map(|found| self.judged_picture(found, inflation)).transpose()?;
-        still_wanted(self.settings)?;
+        check_cancelled(self.settings)?;
         let predicted = self.predicted(denoised.as_ref());
         let Self { started, film, settings, estimate, tone, thresholds, per_sample, over_white, .. } = self;
         let PerSample { met, pooled, pooled_of_halves, of_halves } =
@@ -222,7 +222,7 @@ impl Look<'_> {
         for error in [Some(&mut picture.error), picture.error_as_noise.as_mut()].into_iter().flatten() {
             error.raise_inferred(inflation.sqrt());
         }
-        if self.film.width().min(self.film.height()) < LEAST_SIDE_OF_HALVES {
+        if self.film.width().min(self.film.height()) < MIN_SIDE_OF_HALVES {
             picture.error = picture.error.with_noise_of_at_least(&self.raw_noise());
         }
         if let Some(over_white) = &self.over_white {
@@ -265,9 +265,9 @@ fn divided(visibility: Plane, threshold_factor: Option<&Plane>) -> Plane {
 }
 
 /// Between the parts of a look: goes on unless the look is of no use any more.
-pub(crate) fn still_wanted(settings: &LoopSettings) -> Result<(), JudgeError> {
-    let is_outdated = settings.is_outdated.as_ref().is_some_and(|is_outdated| is_outdated());
-    if is_outdated { Err(JudgeError::Outdated) } else { Ok(()) }
+pub(crate) fn check_cancelled(settings: &LoopSettings) -> Result<(), JudgeError> {
+    let is_cancelled = settings.is_cancelled.as_ref().is_some_and(|is_cancelled| is_cancelled());
+    if is_cancelled { Err(JudgeError::Cancelled) } else { Ok(()) }
 }
 
 impl Judgement {

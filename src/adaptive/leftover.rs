@@ -6,7 +6,7 @@
 use super::forecast::Forecast;
 use super::gain::Energies;
 use super::judge::Judgement;
-use super::plan::{MOST_DOUBLINGS_AT_ONCE, SAMPLES_OF_A_RAW_LOOK, doubled_blocks, doubling_plan};
+use super::plan::{MAX_DOUBLINGS_AT_ONCE, SAMPLES_OF_A_RAW_LOOK, doubled_blocks, doubling_plan};
 use crate::film::Film;
 use crate::integrator::SamplePlan;
 use crate::sampler::Half;
@@ -18,7 +18,7 @@ const MOST_OF_IT: f64 = 0.5;
 /// Where halves that may have more samples bring less of the noise, nothing helps.
 const HELPS: f32 = 0.01;
 /// No energy counts as more: sums stay finite.
-const MOST_ENERGY: f32 = 1e25;
+const MAX_ENERGY: f32 = 1e25;
 
 /// Doublings of the halves whose noise is most of what shows above a rung; none where those that may have more samples
 /// bring next to nothing of it. For a model that pools.
@@ -46,7 +46,7 @@ pub(super) fn of_what_shows(
     };
     let most = SAMPLES_OF_A_RAW_LOOK * film.pixel_count() as f64;
     let mut plan = plan_of(1);
-    for doublings in 2..=MOST_DOUBLINGS_AT_ONCE {
+    for doublings in 2..=MAX_DOUBLINGS_AT_ONCE {
         let further = plan_of(doublings);
         if further.samples() as f64 > most || forecast.is_reached_by(&plan, rung) {
             break;
@@ -93,7 +93,7 @@ impl Shown<'_> {
     fn noise(&self, energies: &[f32], pixel: usize, half: Half) -> f32 {
         let samples = self.film.half(half)[pixel].taken.max(1) as f32;
         // The order of `min` turns NaN into the most.
-        (energies[pixel] / samples).min(MOST_ENERGY)
+        (energies[pixel] / samples).min(MAX_ENERGY)
     }
 
     fn may_have_more(&self, pixel: usize, half: Half) -> bool {

@@ -169,7 +169,7 @@ struct LookTaken {
 ///
 /// # Errors
 /// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours; and
-/// [`JudgeError::Outdated`] where [`LoopSettings::is_outdated`] ends the last look.
+/// [`JudgeError::Cancelled`] where [`LoopSettings::is_cancelled`] ends the last look.
 pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monitor) -> Result<Rendered, JudgeError> {
     let Crop { width, height, .. } = tracer.settings().film_area();
     resume(tracer, settings, RenderState::new(width, height, &settings.limits), monitor)
@@ -199,7 +199,7 @@ pub fn resume(
 }
 
 /// [`resume`] for somebody who may leave the render with [`Directive::Leave`], or in the middle of a look by
-/// [`LoopSettings::is_outdated`], and go on from its state.
+/// [`LoopSettings::is_cancelled`], and go on from its state.
 ///
 /// # Errors
 /// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
@@ -212,7 +212,7 @@ pub fn run(
     let mut render = Loop::new(tracer, settings, state);
     match render.until_last_look(monitor) {
         Ok(Some(LastLook { judgement, stop_reason })) => Ok(render.end(judgement, stop_reason, monitor)),
-        Ok(None) | Err(JudgeError::Outdated) => Ok(Ended { state: render.state, last_look: None }),
+        Ok(None) | Err(JudgeError::Cancelled) => Ok(Ended { state: render.state, last_look: None }),
         Err(error) => {
             monitor.failed(&render.state);
             Err(error)

@@ -1,10 +1,10 @@
 //! What comes after a look: the ladder's rungs, one after the other, and on each of them more samples until it is
 //! reached, no pixel stands out, and an audit agrees.
 
-use super::audit::{Audit, MOST_INFLATION, audit, audit_unproven};
+use super::audit::{Audit, MAX_INFLATION, audit, audit_unproven};
 use super::forecast::Forecast;
 use super::gain::{cut, most_worthwhile, while_far};
-use super::judge::{JudgeError, Judgement, judge_raw, judge_to_plan, still_wanted};
+use super::judge::{JudgeError, Judgement, check_cancelled, judge_raw, judge_to_plan};
 use super::leftover::of_what_shows;
 use super::plan::{
     SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, plan_up_to, uniform_plan, wanted_samples,
@@ -13,7 +13,7 @@ use super::rivals::{rival_plan, rival_stop};
 use super::settings::{LoopSettings, Sampling, THRESHOLD};
 use super::small_things::samples_to_meet;
 use super::state::Exposure;
-use super::stop::{LEAST_SAVING, predicted_saving};
+use super::stop::{MIN_SAVING, predicted_saving};
 use super::until_look::UntilLook;
 use super::{Loop, Step, StopReason, is_reached};
 use crate::integrator::SamplePlan;
@@ -190,13 +190,13 @@ impl Loop<'_> {
     ) -> Result<Option<SamplePlan>, JudgeError> {
         loop {
             if !is_reached(judgement, rung) {
-                still_wanted(self.settings)?;
+                check_cancelled(self.settings)?;
                 return Ok(self.unreached(rung, judgement, left)?.non_empty());
             }
             if self.settings.sampling == Sampling::Uniform || rung > HIGHEST_AUDITED_RUNG {
                 return Ok(None);
             }
-            still_wanted(self.settings)?;
+            check_cancelled(self.settings)?;
             if let Some(plan) = self.peaks(rung, judgement).non_empty() {
                 return Ok(Some(plan));
             }
@@ -234,7 +234,7 @@ impl Loop<'_> {
         let forecast = Forecast::of(film, judgement);
         let wanted = wanted_samples(judgement, &forecast, self.settings.allocation, rung, limits)?;
         self.state.seconds.allocation += started.elapsed().as_secs_f64();
-        if predicted_saving(film, judgement, &wanted.samples, rung) < LEAST_SAVING {
+        if predicted_saving(film, judgement, &wanted.samples, rung) < MIN_SAVING {
             return Ok(None);
         }
         let plan = adaptive_plan(film, judgement, &forecast, &wanted, limits.max_samples);
@@ -259,7 +259,7 @@ impl Loop<'_> {
 
     /// Audits a rung that is reached, as long as the variance may still be raised.
     fn audited(&mut self, rung: f64, judgement: &Judgement) -> Result<AuditOutcome, JudgeError> {
-        if judgement.thresholds.per_pixel.is_some() || self.state.inflation >= MOST_INFLATION {
+        if judgement.thresholds.per_pixel.is_some() || self.state.inflation >= MAX_INFLATION {
             return Ok(AuditOutcome::Holds);
         }
         let (film, round) = (&self.state.film, self.state.audits);
@@ -270,7 +270,7 @@ impl Loop<'_> {
         self.state.audits += 1;
         self.state.audit = found.or(self.state.audit);
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(AuditOutcome::Holds) };
-        self.state.inflation = (self.state.inflation * found.ratio).min(MOST_INFLATION);
+        self.state.inflation = (self.state.inflation * found.ratio).min(MAX_INFLATION);
         Ok(AuditOutcome::Stricter(Box::new(self.look(judge_to_plan)?)))
     }
 

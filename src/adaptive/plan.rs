@@ -14,23 +14,23 @@ use super::forecast::Forecast;
 use super::judge::Judgement;
 use super::settings::{AllocationRule, Limits};
 use crate::film::Film;
-use crate::integrator::{BlockWork, PILOT_SAMPLES_A_HALF, PILOT_SAMPLES_A_PIXEL, SamplePlan};
+use crate::integrator::{BlockWork, PILOT_SAMPLES_PER_HALF, PILOT_SAMPLES_PER_PIXEL, SamplePlan};
 use crate::sampler::Half;
 use fechner_perception::allocation::{AllocationProblem, allocate};
-use fechner_perception::{PIXELS_A_TASK, Plane};
+use fechner_perception::{PIXELS_PER_TASK, Plane};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Doublings that one plan gives a pixel at most where that costs no more than a look. Otherwise there is one: the
 /// pixel's variance, and what stratification makes of it, are looked at again in between, since stratification pays
 /// more the more samples there are.
-pub(super) const MOST_DOUBLINGS_AT_ONCE: u32 = 3;
+pub(super) const MAX_DOUBLINGS_AT_ONCE: u32 = 3;
 
 /// What a look at the picture costs, in samples for every pixel, about.
 pub(super) const SAMPLES_OF_A_RAW_LOOK: f64 = 1.5;
 
 /// Doublings that one plan gives at most to a pixel that shows too much by itself.
-const MOST_DOUBLINGS_OF_EXCESS: u32 = 4;
+const MAX_DOUBLINGS_OF_EXCESS: u32 = 4;
 
 /// One part in so many of the film's samples may go at once to pixels that are doubled on suspicion.
 const SMALL_DOUBLING: u64 = 32;
@@ -41,13 +41,13 @@ const ENOUGH_GAP: f64 = 0.01;
 /// Samples of each half that every pixel has before any has the rest of its pilot: who watches has a picture
 /// of 2 + 2 early, and one that is about even on the way to 8 + 8. Single samples at first would be as many
 /// sums again in a farm's files.
-const FIRST_PASS_SAMPLES_A_HALF: u32 = 2;
+const FIRST_PASS_SAMPLES_PER_HALF: u32 = 2;
 
 /// What a film lacks of the first samples of every pixel: 8 + 8, or `most_samples` in all where they are fewer.
 pub fn pilot_plan(film: &Film, most_samples: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
-    let samples = most_samples.min(PILOT_SAMPLES_A_PIXEL);
-    for [from, to] in [[0, FIRST_PASS_SAMPLES_A_HALF], [FIRST_PASS_SAMPLES_A_HALF, PILOT_SAMPLES_A_HALF]] {
+    let samples = most_samples.min(PILOT_SAMPLES_PER_PIXEL);
+    for [from, to] in [[0, FIRST_PASS_SAMPLES_PER_HALF], [FIRST_PASS_SAMPLES_PER_HALF, PILOT_SAMPLES_PER_HALF]] {
         for half in Half::BOTH {
             let to = to.min(share_of_half(samples, half));
             for pixel in 0..film.pixel_count() as u32 {
@@ -194,7 +194,7 @@ pub(super) fn adaptive_plan(
         return best;
     }
     for margin in MARGINS {
-        let plan = plan_of(Haste { most_doublings: MOST_DOUBLINGS_AT_ONCE, margin });
+        let plan = plan_of(Haste { most_doublings: MAX_DOUBLINGS_AT_ONCE, margin });
         if !is_cheap(&plan) {
             break;
         }
@@ -255,7 +255,7 @@ pub fn doubling_of(film: &Film, max_samples: u32, excess: impl Fn(usize) -> f64 
         (0..pixels).map(|pixel| ((1 << doublings(pixel, most)) - 1) * u64::from(film.samples(pixel))).sum()
     };
     let is_small = |&most: &u32| cost(most) <= film.total_samples() / SMALL_DOUBLING;
-    let most = (2..=MOST_DOUBLINGS_OF_EXCESS).rev().find(is_small).unwrap_or(1);
+    let most = (2..=MAX_DOUBLINGS_OF_EXCESS).rev().find(is_small).unwrap_or(1);
     doubling_plan(film, max_samples, |pixel| [doublings(pixel, most); 2])
 }
 
@@ -269,7 +269,7 @@ pub(super) fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(us
         })
     };
     let pixels = film.pixel_count();
-    let blocks = (0..pixels).into_par_iter().with_min_len(PIXELS_A_TASK).flat_map_iter(of_pixel).collect();
+    let blocks = (0..pixels).into_par_iter().with_min_len(PIXELS_PER_TASK).flat_map_iter(of_pixel).collect();
     SamplePlan { blocks }
 }
 

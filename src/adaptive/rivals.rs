@@ -17,13 +17,13 @@ const RELATIVE_SCALE: f64 = 5.0;
 /// Cycles adds this to what it divides by (`film_adaptive_sampling_convergence_check`).
 const RELATIVE_EPSILON: f64 = 1e-4;
 /// Least mean to divide by, as a share of display white.
-const LEAST_MEAN: f64 = 1e-3;
+const MIN_MEAN: f64 = 1e-3;
 /// Side of the square of pixels whose samples Tungsten pools.
 const RECORD_SIDE: usize = 4;
 /// Quantile of records' errors at which Tungsten clamps them (`errorPercentile95`).
 const CLAMPED_AT: f64 = 0.95;
 /// Tungsten's least squared mean to divide by.
-const LEAST_SQUARED_MEAN: f64 = 1e-3;
+const MIN_SQUARED_MEAN: f64 = 1e-3;
 
 /// The next samples by a rule, `left` in all at most; empty when the rule would stop. `exposure` turns scene units
 /// into shares of display white.
@@ -103,7 +103,7 @@ fn variance_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
     let is_active = |pixel: usize| {
         let halves = film.halves(pixel);
         let mean = halves.mean(HalfPixel::luminance);
-        halves.variance_of_mean(0).sqrt() > threshold * mean.max(LEAST_MEAN / exposure)
+        halves.variance_of_mean(0).sqrt() > threshold * mean.max(MIN_MEAN / exposure)
     };
     (0..film.pixel_count()).map(is_active).collect()
 }
@@ -172,7 +172,7 @@ fn record_error(film: &Film, pixels: impl Iterator<Item = usize>, exposure: f64)
     }
     let mean = sum / count;
     let variance = ((squares - count * mean * mean) / (count - 1.0)).max(0.0);
-    variance / (count * (mean * mean).max(LEAST_SQUARED_MEAN))
+    variance / (count * (mean * mean).max(MIN_SQUARED_MEAN))
 }
 
 #[cfg(test)]

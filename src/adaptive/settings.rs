@@ -2,7 +2,7 @@
 
 use super::pursuit::Pursuit;
 use crate::denoise::Denoiser;
-use crate::integrator::{PILOT_SAMPLES_A_PIXEL, TraceSettings};
+use crate::integrator::{PILOT_SAMPLES_PER_PIXEL, TraceSettings};
 use crate::sampler::PixelFilter;
 use fechner_perception::Plane;
 use fechner_perception::csf::FrameTiming;
@@ -87,7 +87,7 @@ pub struct Limits {
 }
 
 /// Pilot of a picture that is denoised: the denoiser reads neighbours where raw variance needs samples of the pixel's own.
-pub const DENOISED_PILOT_SAMPLES_A_PIXEL: u32 = 4;
+pub const DENOISED_PILOT_SAMPLES_PER_PIXEL: u32 = 4;
 
 impl Limits {
     /// The visibility that is aimed at; 1, which is at threshold, where only other limits count.
@@ -120,7 +120,7 @@ impl Limits {
             mean_samples: None,
             max_samples: DEFAULT_MAX_SAMPLES,
             plans: None,
-            pilot_samples: PILOT_SAMPLES_A_PIXEL,
+            pilot_samples: PILOT_SAMPLES_PER_PIXEL,
         }
     }
 }
@@ -161,7 +161,7 @@ pub struct LoopSettings {
     /// Whether the picture has alpha and is laid over other pictures, so that noise of what it covers must be invisible over black and over white.
     pub is_transparent: bool,
     /// Asked during a look: whether it is of no use any more, as somebody wants another picture. `None` never interrupts.
-    pub is_outdated: Option<Box<dyn Fn() -> bool + Send + Sync>>,
+    pub is_cancelled: Option<Box<dyn Fn() -> bool + Send + Sync>>,
 }
 
 impl LoopSettings {
@@ -183,7 +183,7 @@ impl LoopSettings {
             filter: trace.filter,
             denoiser: None,
             is_transparent: trace.transparent,
-            is_outdated: None,
+            is_cancelled: None,
         }
     }
 

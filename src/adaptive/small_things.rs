@@ -14,14 +14,14 @@ use fechner_perception::tone::Pixel;
 /// Samples that should meet the lamp: so many pass by all of them in one pixel of 3000.
 const MEETINGS: f64 = 8.0;
 /// Fewer are not worth having.
-const FEWEST_MEETINGS: f64 = 1.0;
+const MIN_MEETINGS: f64 = 1.0;
 /// A lamp that covers so much of a pixel is found by its first samples.
 const FOUND_ANYWAY: f32 = 0.5;
 /// A pixel gets no more samples than this, and none for a lamp that these would not meet once.
-const MOST_SAMPLES: f64 = 4096.0;
+const MAX_SAMPLES: f64 = 4096.0;
 /// What less of a pixel's samples meets is left to chance: most pixels never have so many. The pixel filter's tails
 /// hold as little of the sun, and show white after its first meeting.
-const LEAST_SHARE: f32 = 1.0 / 65_536.0;
+const MIN_SHARE: f32 = 1.0 / 65_536.0;
 /// Share of the pilot's samples that this may take.
 const MOST_OF_PILOT: f64 = 0.5;
 
@@ -34,7 +34,7 @@ pub(super) fn samples_to_meet(shares: &[f32], limits: &Limits) -> Option<Vec<u32
     let budget = limits.mean_samples.map_or(f64::INFINITY, |mean| f64::from(mean) - pilot);
     let affordable = budget.min(MOST_OF_PILOT * pilot) * shares.len() as f64;
     let mut meetings = MEETINGS;
-    while meetings >= FEWEST_MEETINGS {
+    while meetings >= MIN_MEETINGS {
         let wanted: Vec<u32> = shares.iter().map(|&share| wanted(share, meetings).min(limits.max_samples)).collect();
         let cost: f64 = wanted.iter().map(|&samples| (f64::from(samples) - pilot).max(0.0)).sum();
         if cost <= affordable {
@@ -47,9 +47,9 @@ pub(super) fn samples_to_meet(shares: &[f32], limits: &Limits) -> Option<Vec<u32
 
 /// Samples of a pixel of which the lamp covers such a share, for so many meetings.
 fn wanted(share: f32, meetings: f64) -> u32 {
-    let of_most = f64::from(share) * MOST_SAMPLES;
-    let is_small = of_most >= FEWEST_MEETINGS && share < FOUND_ANYWAY;
-    if is_small { (meetings / f64::from(share)).min(MOST_SAMPLES).ceil() as u32 } else { 0 }
+    let of_most = f64::from(share) * MAX_SAMPLES;
+    let is_small = of_most >= MIN_MEETINGS && share < FOUND_ANYWAY;
+    if is_small { (meetings / f64::from(share)).min(MAX_SAMPLES).ceil() as u32 } else { 0 }
 }
 
 /// How wrong each pixel is expected to be seen of which samples have met known things fewer than [`MEETINGS`] times:
@@ -81,11 +81,11 @@ pub(super) fn unmet_noise(
 }
 
 /// How often a pixel's samples are expected to have met its known things, where that is fewer than [`MEETINGS`] times;
-/// `None` where it has none, or less than [`LEAST_SHARE`].
+/// `None` where it has none, or less than [`MIN_SHARE`].
 pub(super) fn few_meetings(film: &Film, pixel: usize) -> Option<f64> {
     let share = film.known_things.as_ref()?.share(pixel);
     let expected = f64::from(share) * f64::from(film.samples(pixel));
-    (share >= LEAST_SHARE && expected < MEETINGS && expected > 0.0).then_some(expected)
+    (share >= MIN_SHARE && expected < MEETINGS && expected > 0.0).then_some(expected)
 }
 
 /// The mean of what depends on a count that is `expected` on average, but for a hundred-thousandth of the cases.

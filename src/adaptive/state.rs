@@ -5,7 +5,7 @@ use super::plan::pilot_plan;
 use super::settings::Limits;
 pub use super::until_look::UntilLook;
 use crate::film::Film;
-use crate::integrator::{BlockWork, PILOT_SAMPLES_A_PIXEL, SamplePlan};
+use crate::integrator::{BlockWork, PILOT_SAMPLES_PER_PIXEL, SamplePlan};
 use crate::sampler::Half;
 use fechner_perception::tone::SavedTone;
 use serde::{Deserialize, Serialize};
@@ -137,7 +137,7 @@ impl RenderState {
     fn is_planned_within(&self, limits: &Limits) -> bool {
         let is_pilot = self.plans == 0;
         if self.pending.is_empty()
-            || is_pilot && limits.mean_samples.is_none() && limits.max_samples >= PILOT_SAMPLES_A_PIXEL
+            || is_pilot && limits.mean_samples.is_none() && limits.max_samples >= PILOT_SAMPLES_PER_PIXEL
         {
             return true;
         }

@@ -9,7 +9,7 @@ mod pooling;
 
 use crate::film::{CHANNELS, Film, HalfPixel, Halves, opponent, share_of_mean};
 use crate::sampler::Half;
-use fechner_perception::{PIXELS_A_TASK, Plane};
+use fechner_perception::{PIXELS_PER_TASK, Plane};
 use pooling::{PixelSurfaces, Pooled, pooled_by_neighbours};
 use rayon::prelude::*;
 
@@ -52,13 +52,13 @@ pub struct DifferenceOnDisplay {
 
 /// Most times of what independent samples would differ by that the halves count as differing: stratified samples do
 /// better, hardly ever worse.
-pub const MOST_FACTOR: f32 = 1.2;
+pub const MAX_FACTOR: f32 = 1.2;
 
 impl SampleStatistics {
     /// Pools a film. `scale` turns each pixel's scene variance, by channel, into what counts: displayed variance, since
     /// a lamp's border scatters far above what the display can show, and its dark neighbours must not inherit that.
     pub fn of(film: &Film, scale: &[Plane; CHANNELS]) -> Self {
-        Self::by(film, scale, MOST_FACTOR, |_, evidence| evidence)
+        Self::by(film, scale, MAX_FACTOR, |_, evidence| evidence)
     }
 
     /// Pools a film as [`Self::of`], with the halves' differences as the display shows them: of what is mostly beyond
@@ -84,7 +84,7 @@ impl SampleStatistics {
         let (a, b) = (film.half(Half::A), film.half(Half::B));
         let evidence: Vec<[PixelEvidence; CHANNELS]> = (0..a.len())
             .into_par_iter()
-            .with_min_len(PIXELS_A_TASK)
+            .with_min_len(PIXELS_PER_TASK)
             .map(|i| refined(i, PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i]))))
             .collect();
         let surfaces = PixelSurfaces { guides: film.guides(), known_things: film.known_things.as_ref() };
@@ -286,7 +286,7 @@ mod tests {
         let like = |value: f32| std::array::from_fn(|_| scale[0].map(|_| value));
         let difference = DifferenceOnDisplay { squared: like(1.0), expected: like(0.01), most_factor: 4.0 };
         let factor = |statistics: &SampleStatistics| statistics.luminance().low_discrepancy_factor.mean();
-        assert!((factor(&SampleStatistics::of(&film, &scale)) - f64::from(MOST_FACTOR)).abs() < 1e-6);
+        assert!((factor(&SampleStatistics::of(&film, &scale)) - f64::from(MAX_FACTOR)).abs() < 1e-6);
         assert_eq!(factor(&SampleStatistics::of_displayed(&film, &scale, &difference)), 4.0);
     }
 

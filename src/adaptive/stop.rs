@@ -11,7 +11,7 @@ pub const TOLERATED_SHARE: f64 = 0.001;
 /// target.
 const TOLERATED_WORST: f64 = 2.0;
 /// Below this predicted saving the loop samples uniformly: its estimates err by more.
-pub(super) const LEAST_SAVING: f64 = 0.05;
+pub(super) const MIN_SAVING: f64 = 0.05;
 
 /// Why a render ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,7 +60,7 @@ pub(super) fn predicted_saving(film: &Film, judgement: &Judgement, wanted: &Plan
     // Mostly the saving is large, and a rough look tells.
     let variance = &judgement.pooled_variance_per_sample;
     let roughly = saving(&judgement.rough_visibility_of(variance));
-    if roughly > 4.0 * LEAST_SAVING { roughly } else { saving(&judgement.visibility_of(variance)) }
+    if roughly > 4.0 * MIN_SAVING { roughly } else { saving(&judgement.visibility_of(variance)) }
 }
 
 /// Share of pixels whose predicted visibility is above `visibility`.

@@ -2,7 +2,7 @@
 
 use super::settings::LoopSettings;
 use crate::film::{Film, film_of_samples};
-use crate::integrator::{FirstHit, PILOT_SAMPLES_A_HALF, PathSample, TraceSettings};
+use crate::integrator::{FirstHit, PILOT_SAMPLES_PER_HALF, PathSample, TraceSettings};
 use crate::sampler::{Half, hash_words, unit_of_hash};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::operator;
@@ -29,7 +29,7 @@ pub(super) fn film_of(color: impl Fn(u32, f32) -> Vec3) -> Film {
 
 /// A pilot, square, of `color(pixel, random in −1..1)`, of whose pixels some shine.
 pub(super) fn film_of_lamps(color: impl Fn(u32, f32) -> Vec3, shines: impl Fn(u32) -> bool) -> Film {
-    film_of_halves([PILOT_SAMPLES_A_HALF; 2], shines, |pixel, _, random| color(pixel, random))
+    film_of_halves([PILOT_SAMPLES_PER_HALF; 2], shines, |pixel, _, random| color(pixel, random))
 }
 
 /// A square film of so many samples of each half of every pixel, some of which shine, of

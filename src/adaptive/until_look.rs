@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 /// Samples for every pixel that a plan adds at least, while its pixels may have so many: variances of four samples are
 /// not worth being asked more often.
-const LEAST_PLAN: f64 = 6.0;
+const MIN_PLAN: f64 = 6.0;
 /// What a look costs with Open Image Denoise, in samples for every pixel, about: 5 to 15
 /// (`benches/results/denoising.md`).
 const SAMPLES_OF_AN_OIDN_LOOK: f64 = 10.0;
@@ -23,17 +23,17 @@ const SAMPLES_OF_A_BUILTIN_LOOK: f64 = 3.0;
 /// Samples for every pixel between two looks at the least, and before the first one: spent on more of them,
 /// what the dearer look costs is spent better. The same with the built-in filter; whether more of its looks
 /// would pay was not measured.
-const LEAST_SAMPLES_BETWEEN_LOOKS: f64 = SAMPLES_OF_AN_OIDN_LOOK;
+const MIN_SAMPLES_BETWEEN_LOOKS: f64 = SAMPLES_OF_AN_OIDN_LOOK;
 /// Most that comes between two looks, as a share of what is there.
-const MOST_GROWTH: f64 = 3.0;
+const MAX_GROWTH: f64 = 3.0;
 /// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes
 /// 0.8 to 2.7 times better at 32 samples, one of them 4.4 times at 8 (`benches/results/denoising.md`).
-const MOST_GAIN: f64 = 3.0;
+const MAX_GAIN: f64 = 3.0;
 /// Doublings of a pixel in one plan.
-const MOST_DOUBLINGS: u32 = 2;
+const MAX_DOUBLINGS: u32 = 2;
 /// What is in a pixel's window above the visibility asked for, as a share of what is in the window that has most, from
 /// which on its noise counts.
-const LEAST_BLAME: f32 = 0.1;
+const MIN_BLAME: f32 = 0.1;
 
 /// What a look at a denoised picture costs, in samples for every pixel, about.
 pub(super) fn samples_of_a_look(denoiser: &Denoiser) -> f64 {
@@ -58,8 +58,8 @@ impl UntilLook {
     /// When to look before the first look.
     pub(super) fn first(film: &Film) -> Self {
         let pixels = film.pixel_count();
-        let earliest = LEAST_SAMPLES_BETWEEN_LOOKS * pixels as f64;
-        let latest = (1.0 + MOST_GROWTH) * earliest;
+        let earliest = MIN_SAMPLES_BETWEEN_LOOKS * pixels as f64;
+        let latest = (1.0 + MAX_GROWTH) * earliest;
         Self { to_blame: vec![true; pixels], earliest: earliest as u64, latest: latest as u64 }
     }
 
@@ -76,9 +76,9 @@ impl UntilLook {
         let to_blame = to_blame(judgement, visibility);
         let present: f64 = wanted(&to_blame).map(|pixel| f64::from(film.samples(pixel))).sum();
         let growth = judgement.predicted.quantile(1.0 - TOLERATED_SHARE) / visibility - 1.0;
-        let least = LEAST_SAMPLES_BETWEEN_LOOKS * to_blame.len() as f64;
+        let least = MIN_SAMPLES_BETWEEN_LOOKS * to_blame.len() as f64;
         // The order of `max` turns NaN, of 0 / 0, into the least.
-        let most = MOST_GROWTH * present;
+        let most = MAX_GROWTH * present;
         let added = (growth.max(GROWTH) * present).max(least).min(most);
         let after = |added: f64| film.total_samples() + added as u64;
         Self { to_blame, earliest: after(added), latest: after(most) }
@@ -98,7 +98,7 @@ impl UntilLook {
     /// can bring the picture to it.
     pub(super) fn must_look(&self, film: &Film, raw: &Judgement, visibility: f64) -> bool {
         let is_late = film.total_samples() + self.to_blame.len() as u64 > self.latest;
-        is_late || raw.predicted.quantile(1.0 - TOLERATED_SHARE) <= MOST_GAIN * visibility
+        is_late || raw.predicted.quantile(1.0 - TOLERATED_SHARE) <= MAX_GAIN * visibility
     }
 
     /// A plan of more samples for the pixels to blame; at most `left` in all. `judgement` may be of the raw picture.
@@ -120,7 +120,7 @@ fn to_blame(judgement: &Judgement, visibility: f64) -> Vec<bool> {
     let above = judgement.predicted.map(|predicted| f32::from(f64::from(predicted) > visibility));
     let shares = judgement.thresholds.in_bands.pooled(&above);
     let most = shares.values().iter().fold(0.0, |a: f32, &share| a.max(share));
-    let is_to_blame = |(&above, &share): (&f32, &f32)| above > 0.0 || share > LEAST_BLAME * most;
+    let is_to_blame = |(&above, &share): (&f32, &f32)| above > 0.0 || share > MIN_BLAME * most;
     above.values().iter().zip(shares.values()).map(is_to_blame).collect()
 }
 
@@ -140,7 +140,7 @@ fn is_for_all(to_blame: &[bool]) -> bool {
 fn plan_by_energy(film: &Film, energies: &[f64], to_blame: &[bool], max_samples: u32, left: u64) -> SamplePlan {
     let pixels = energies.len();
     let present: f64 = wanted(to_blame).map(|pixel| f64::from(film.samples(pixel))).sum();
-    let enough = (GROWTH * present).max(LEAST_PLAN * pixels as f64).min(left as f64);
+    let enough = (GROWTH * present).max(MIN_PLAN * pixels as f64).min(left as f64);
     if is_for_all(to_blame) && share_of_even(energies) > EVEN_ENOUGH {
         let mean_samples = ((present + enough) / pixels as f64).round() as u32;
         return plan_up_to(film, |_| mean_samples.min(max_samples));
@@ -149,7 +149,7 @@ fn plan_by_energy(film: &Film, energies: &[f64], to_blame: &[bool], max_samples:
     let mut added = 0.0;
     while added < enough {
         let count = |pixel: usize| f64::from(film.samples(pixel).max(1) << doublings[pixel]);
-        let may_double = |pixel: usize| doublings[pixel] < MOST_DOUBLINGS && count(pixel) < f64::from(max_samples);
+        let may_double = |pixel: usize| doublings[pixel] < MAX_DOUBLINGS && count(pixel) < f64::from(max_samples);
         let gain = |pixel: usize| if may_double(pixel) { gain(energies[pixel], count(pixel)) } else { 0.0 };
         let mut gains: Vec<f64> = wanted(to_blame).map(gain).filter(|&gain| gain > 0.0).collect();
         if gains.is_empty() {

@@ -13,7 +13,7 @@ use crate::adaptive::judge::{JudgeError, judge};
 use crate::adaptive::plan::{needed_samples, pilot_plan};
 use crate::adaptive::settings::Limits;
 use crate::film::Film;
-use crate::integrator::{PILOT_SAMPLES_A_PIXEL, PathTracer};
+use crate::integrator::{PILOT_SAMPLES_PER_PIXEL, PathTracer};
 use crate::scene::load::LoadError;
 use fechner_perception::tone::ToneOperator;
 use std::time::Instant;
@@ -27,7 +27,7 @@ const LAST_ASKED: usize = ASKED.len() - 1;
 /// rare.
 const MARGIN: f64 = 1.3;
 /// Needs up to here pilots know; beyond it their error goes as the need.
-const KNOWN_SAMPLES: f64 = 2.0 * PILOT_SAMPLES_A_PIXEL as f64;
+const KNOWN_SAMPLES: f64 = 2.0 * PILOT_SAMPLES_PER_PIXEL as f64;
 
 /// Why a budget could not be spread.
 #[derive(Debug, thiserror::Error)]
@@ -73,12 +73,12 @@ impl Needs {
             let area = tracer.settings().film_area();
             let mut film = Film::new(area.width, area.height);
             let started = Instant::now();
-            tracer.trace(&pilot_plan(&film, PILOT_SAMPLES_A_PIXEL), &mut film, &|_| {});
+            tracer.trace(&pilot_plan(&film, PILOT_SAMPLES_PER_PIXEL), &mut film, &|_| {});
             seconds += started.elapsed().as_secs_f64();
             samples += film.total_samples();
             let judgement = judge(&film, &settings, 1.0)?;
             // What frames need is asked to know how the budget is shared, so that it limits none of them.
-            let limits = Limits { pilot_samples: PILOT_SAMPLES_A_PIXEL, mean_samples: None, ..shot.limits };
+            let limits = Limits { pilot_samples: PILOT_SAMPLES_PER_PIXEL, mean_samples: None, ..shot.limits };
             let mut ln_samples = [0.0; ASKED.len()];
             for (ln_samples, visibility) in ln_samples.iter_mut().zip(ASKED) {
                 let needed = needed_samples(&film, &judgement, visibility, &limits);
@@ -101,7 +101,7 @@ impl Needs {
     /// Samples a pixel that each frame needs for a visibility: at least a pilot's, at most what it may have.
     fn samples(&self, visibility: f64) -> Vec<f64> {
         let octaves = |at: usize, other: usize| (ASKED[at] / ASKED[other]).log2();
-        let [least, most] = [PILOT_SAMPLES_A_PIXEL, self.max_samples].map(f64::from);
+        let [least, most] = [PILOT_SAMPLES_PER_PIXEL, self.max_samples].map(f64::from);
         self.ln_samples
             .iter()
             .map(|ln_samples| {
@@ -138,7 +138,7 @@ impl Needs {
     /// is more than pixels may have.
     pub fn shares(&self, mean_samples: u32, asked: f64) -> Vec<u32> {
         let count = self.ln_samples.len();
-        if mean_samples <= PILOT_SAMPLES_A_PIXEL {
+        if mean_samples <= PILOT_SAMPLES_PER_PIXEL {
             return vec![mean_samples; count];
         }
         let budget = f64::from(mean_samples) * count as f64;

@@ -4,20 +4,20 @@
 use super::track::{Track, goal_of};
 use super::{SceneSource, ShotSettings};
 use crate::adaptive::glimpse::brief_glimpse_for;
-use crate::integrator::PILOT_SAMPLES_A_PIXEL;
+use crate::integrator::PILOT_SAMPLES_PER_PIXEL;
 use crate::scene::load::LoadError;
 use fechner_perception::tone::ToneOperator;
 
 /// Frames that are piloted, if there are as many.
 const PILOTED_FRAMES: usize = 9;
 /// Most of them in a shot whose light changes often.
-const MOST_PILOTED_FRAMES: usize = 32;
+const MAX_PILOTED_FRAMES: usize = 32;
 /// One in so many samples of a budget may be taken, and thrown away, by pilots beyond the first nine.
 const SHARE_OF_PILOTS: u64 = 10;
 /// Light within this ratio of what lies between piloted frames has not changed: noise of brief looks is below it.
 const STEADY_RATIO: f64 = 1.25;
 /// No stretch without a pilot is longer than one in so many of the shot, however much its light changes elsewhere.
-const LEAST_STRETCHES: usize = 4;
+const MIN_STRETCHES: usize = 4;
 
 /// The frames of a shot to pilot, in order, counted from its first.
 pub(super) fn piloted_frames(
@@ -64,8 +64,8 @@ fn brief_light(
 /// Pilots that light may ask for.
 fn most_for_light(frames: usize, mean_samples: Option<u32>) -> usize {
     let budget = u64::from(mean_samples.unwrap_or(0)) * frames as u64;
-    let afforded = budget / (SHARE_OF_PILOTS * u64::from(PILOT_SAMPLES_A_PIXEL));
-    afforded.clamp(PILOTED_FRAMES as u64, MOST_PILOTED_FRAMES as u64) as usize
+    let afforded = budget / (SHARE_OF_PILOTS * u64::from(PILOT_SAMPLES_PER_PIXEL));
+    afforded.clamp(PILOTED_FRAMES as u64, MAX_PILOTED_FRAMES as u64) as usize
 }
 
 /// Both ends; then, again and again, the frame whose light is farthest from what lies between piloted ones, up to
@@ -79,7 +79,7 @@ fn where_light_changes(ln_light: &[f64], most: usize) -> Vec<usize> {
         insert(&mut piloted, frame);
     }
     while let Some(stretch) = longest_stretch(&piloted)
-        && (piloted.len() < PILOTED_FRAMES || stretch.frames() > last.div_ceil(LEAST_STRETCHES))
+        && (piloted.len() < PILOTED_FRAMES || stretch.frames() > last.div_ceil(MIN_STRETCHES))
     {
         insert(&mut piloted, stretch.middle());
     }
@@ -184,8 +184,8 @@ mod tests {
         let light: Vec<f64> = (0..101).map(|frame| if frame < 30 && frame % 2 == 1 { 2.0 } else { 0.0 }).collect();
         let piloted = where_light_changes(&light, PILOTED_FRAMES);
         assert!(piloted.windows(2).all(|pair| pair[1] - pair[0] <= 25), "{piloted:?}");
-        assert!(piloted.len() <= PILOTED_FRAMES + LEAST_STRETCHES, "{piloted:?}");
-        assert_eq!(where_light_changes(&light, MOST_PILOTED_FRAMES)[..30], (0..30).collect::<Vec<_>>());
+        assert!(piloted.len() <= PILOTED_FRAMES + MIN_STRETCHES, "{piloted:?}");
+        assert_eq!(where_light_changes(&light, MAX_PILOTED_FRAMES)[..30], (0..30).collect::<Vec<_>>());
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::name::distinct_names;
 use super::reached::Reached;
 use super::reference::trace_up_to;
 use super::{tone_operator, viewing};
-use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings};
+use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_PER_PIXEL, Limits, LoopSettings};
 use crate::adaptive::{Quiet, render};
 use crate::animate::budget::Needs;
 use crate::animate::track::Track;
@@ -177,7 +177,7 @@ impl<'a> Bench<'a> {
         let denoiser = settings.denoiser.map(Denoiser::open).transpose()?;
         let mut limits = Limits::of_visibility(settings.visibility);
         if denoiser.is_some() {
-            limits.pilot_samples = DENOISED_PILOT_SAMPLES_A_PIXEL;
+            limits.pilot_samples = DENOISED_PILOT_SAMPLES_PER_PIXEL;
         }
         let first = (START_S * rate).round() as u32;
         let trace = TraceSettings::new(settings.size.0, settings.size.1, 0);

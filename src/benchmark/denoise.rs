@@ -11,10 +11,10 @@ use super::race::{Race, RaceMean, RacePoint, RaceRule, compare_with_uniform, mea
 use super::reference::Reference;
 use super::truth::Truth;
 use super::{BenchSettings, Subject, check_inputs, make_folders};
-use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, LoopSettings, RivalRule, Sampling};
+use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_PER_PIXEL, LoopSettings, RivalRule, Sampling};
 use crate::adaptive::{Quiet, Rendered, render};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
-use crate::integrator::PILOT_SAMPLES_A_PIXEL;
+use crate::integrator::PILOT_SAMPLES_PER_PIXEL;
 use crate::json_file;
 use anyhow::Result;
 use fechner_perception::Plane;
@@ -155,7 +155,7 @@ impl SceneBench<'_> {
         let mut settings = self.subject.loop_settings()?;
         settings.limits.visibility = Some(self.settings.target);
         settings.limits.mean_samples = Some(spp);
-        settings.limits.pilot_samples = DENOISED_PILOT_SAMPLES_A_PIXEL;
+        settings.limits.pilot_samples = DENOISED_PILOT_SAMPLES_PER_PIXEL;
         settings.denoiser = Some(denoiser.clone());
         Ok(settings)
     }
@@ -244,7 +244,7 @@ impl SceneBench<'_> {
                 let threshold = RELATIVE_NOISE_OF_ONE_SAMPLE / f64::from(spp).sqrt();
                 settings.sampling = Sampling::Rival(RivalRule::Relative { threshold });
                 settings.limits.mean_samples = Some(ROOM_OF_A_RIVAL * spp);
-                settings.limits.pilot_samples = PILOT_SAMPLES_A_PIXEL;
+                settings.limits.pilot_samples = PILOT_SAMPLES_PER_PIXEL;
             }
             RaceRule::Visible => settings.limits.visibility = Some(OUT_OF_REACH),
         }

@@ -19,7 +19,7 @@ use glam::Vec2;
 use std::sync::Arc;
 
 /// Motion there and back may miss its beginning by this, in pixels: more, and one of the frames does not see the point.
-const MOST_MISSED_PX: f32 = 0.75;
+const MAX_MISSED_PX: f32 = 0.75;
 
 /// What is told of a shot's frames.
 #[derive(Clone, Copy, Debug)]
@@ -98,7 +98,7 @@ fn matches(earlier: &VelocityMap, now: &VelocityMap, (width, height): (usize, us
         let is_inside = place.x >= 0.0 && place.y >= 0.0 && place.x < width as f32 && place.y < height as f32;
         let there = is_inside.then(|| place.y as usize * width + place.x as usize)?;
         let missed = (now.to_previous[pixel] + earlier.to_next[there]).length();
-        (missed <= MOST_MISSED_PX).then_some(there)
+        (missed <= MAX_MISSED_PX).then_some(there)
     };
     (0..width * height).map(matching).collect()
 }

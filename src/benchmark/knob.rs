@@ -8,7 +8,7 @@ const TRIES: usize = 4;
 /// True v over v\* that ends a search: what is left is scaled away.
 const NEAR_ENOUGH: std::ops::Range<f64> = 0.89..1.12;
 /// Most that a knob is turned at once.
-const MOST_STEP: f64 = 10.0;
+const MAX_STEP: f64 = 10.0;
 
 /// Renders with ever better settings, and returns the render that came nearest to v\* by ratio. Knobs are like errors:
 /// what is left scales with them. `render` returns a render and its true v over v\*.
@@ -23,7 +23,7 @@ pub(super) fn nearest<T>(first: f64, mut render: impl FnMut(f64) -> Result<(T, f
         if NEAR_ENOUGH.contains(&reached) {
             break;
         }
-        knob /= reached.clamp(MOST_STEP.recip(), MOST_STEP);
+        knob /= reached.clamp(MAX_STEP.recip(), MAX_STEP);
         let rendered;
         (rendered, reached) = render(knob)?;
         // Of renders without any visible error the last, which took the fewest samples.

@@ -5,7 +5,7 @@ use super::reference::Reference;
 use super::truth::Truth;
 use crate::adaptive::settings::DEFAULT_MAX_SAMPLES;
 use crate::film::{CHANNELS, Film};
-use crate::integrator::{BlockWork, PILOT_SAMPLES_A_HALF, PILOT_SAMPLES_A_PIXEL, SamplePlan};
+use crate::integrator::{BlockWork, PILOT_SAMPLES_PER_HALF, PILOT_SAMPLES_PER_PIXEL, SamplePlan};
 use crate::sampler::{Half, hash_words, unit_f64_of_hash};
 use anyhow::Result;
 use fechner_perception::allocation::{Allocation, AllocationProblem, FINE_GAP, allocate};
@@ -48,7 +48,7 @@ pub(crate) fn uniform_samples(subject: &Subject, truth: &Truth, variance: &Plane
 /// The samples that the oracle takes for a visibility on this share of the picture, in every pixel the pilot of our own
 /// loop at least: it is there to be compared with, and is traced as the loop traces.
 pub(crate) fn least_samples(truth: &Truth, variance: &Plane, visibility: f64, coverage: f64) -> Result<Plane> {
-    Ok(optimum(truth, variance, visibility, coverage, f64::from(PILOT_SAMPLES_A_PIXEL))?.samples)
+    Ok(optimum(truth, variance, visibility, coverage, f64::from(PILOT_SAMPLES_PER_PIXEL))?.samples)
 }
 
 /// The fewest mean samples a pixel that any rule could take for a visibility on this share of the picture, with
@@ -86,7 +86,7 @@ pub(crate) fn trace_counts(subject: &Subject, counts: &Plane, seed: u64) -> Film
     for (pixel, &count) in counts.values().iter().enumerate() {
         for half in Half::BOTH {
             let random = unit_f64_of_hash(hash_words(hash_words(seed, pixel as u64), half.index() as u64));
-            let pilots = (0.5 * f64::from(count) / f64::from(PILOT_SAMPLES_A_HALF)).max(1.0);
+            let pilots = (0.5 * f64::from(count) / f64::from(PILOT_SAMPLES_PER_HALF)).max(1.0);
             let doublings = pilots.log2().floor();
             let share = 2.0 * (1.0 - doublings.exp2() / pilots);
             let is_next = random < share;

@@ -18,7 +18,7 @@ use std::sync::OnceLock;
 /// Seed of references, far from those of arms.
 const REFERENCE_SEED: u64 = 0x5245_4645;
 /// Most samples a pixel that a reference takes.
-const MOST_SAMPLES: f64 = 16_384.0;
+const MAX_SAMPLES: f64 = 16_384.0;
 
 /// A long uniform render.
 pub(crate) struct Reference {
@@ -67,7 +67,7 @@ impl Reference {
             trace_up_to(&tracer, &mut film, spp);
             let reached = judge(&film, &settings, 1.0)?.predicted.quantile(MAIN_COVERAGE) / subject.visibility;
             let needed = f64::from(spp) * reached * reached;
-            if needed <= f64::from(spp) || f64::from(spp) >= MOST_SAMPLES {
+            if needed <= f64::from(spp) || f64::from(spp) >= MAX_SAMPLES {
                 // A picture without noise needs none; no render takes fewer than one. As it is kept: a run
                 // that goes on has the same.
                 break f64::from(needed.max(1.0) as f32);
@@ -75,7 +75,7 @@ impl Reference {
             spp *= 2;
         };
         let factors = Self::display_factors(subject, &film)?;
-        let wanted = (factor * uniform_spp).clamp(512.0, MOST_SAMPLES).log2().ceil().exp2() as u32;
+        let wanted = (factor * uniform_spp).clamp(512.0, MAX_SAMPLES).log2().ceil().exp2() as u32;
         while spp < wanted {
             spp *= 2;
             trace_up_to(&tracer, &mut film, spp);

@@ -78,10 +78,10 @@ impl Truth {
 /// Measured without: a lamp of one pixel needs 7e-12 samples by one seed and 1000 by another, and intervals go up to
 /// 8e44.
 fn beyond_own(energy: f32, own: f32) -> f32 {
-    const LEAST_SHARE: f32 = 0.01;
+    const MIN_SHARE: f32 = 0.01;
     const LEAST: f32 = 1e-8;
     let beyond = energy - own;
-    if beyond > (LEAST_SHARE * own).max(LEAST) { beyond } else { 0.0 }
+    if beyond > (MIN_SHARE * own).max(LEAST) { beyond } else { 0.0 }
 }
 
 fn channel(thresholds: &ColourThresholds, channel: usize) -> &ThresholdMap {

@@ -10,7 +10,7 @@
 
 use super::albedo_table::DirectionalCurve;
 use super::anisotropic_table::AnisotropicTable;
-use super::energy::{self, LARGEST_SINGLE_SHARE, ReflectionTables};
+use super::energy::{self, MAX_SINGLE_SHARE, ReflectionTables};
 use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
 use super::warp::GrazingHemisphere;
@@ -118,6 +118,6 @@ impl Facets<'_> {
     /// Probability that a sample is one bounce off a facet. Close to its share of the energy; never below 0.25, since a
     /// dark tint makes the other lobe count for less than it does for a lossless metal.
     fn single_share(&self, wo: Vec3) -> f32 {
-        (1.0 - self.missing.at(wo)).clamp(0.25, LARGEST_SINGLE_SHARE)
+        (1.0 - self.missing.at(wo)).clamp(0.25, MAX_SINGLE_SHARE)
     }
 }

@@ -10,7 +10,7 @@
 //! Kulla & Conty (2017) for the compensation. Not for sheets without an inside: see the thin dielectric.
 
 use super::dielectric_tables::{DielectricCompensation, DielectricTables, Side};
-use super::energy::{self, LARGEST_SINGLE_SHARE};
+use super::energy::{self, MAX_SINGLE_SHARE};
 use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
 use super::warp::GrazingHemisphere;
@@ -20,7 +20,7 @@ use std::f32::consts::FRAC_1_PI;
 
 /// An index closer to 1 than this bends light by less than the smallest roughness does, so the boundary is smooth; the
 /// half-way vector of refraction would be lost in rounding.
-const SMALLEST_INDEX_STEP: f32 = 1e-3;
+const MIN_INDEX_STEP: f32 = 1e-3;
 
 /// Boundary of a clear volume.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,7 @@ impl<'a> Dielectric<'a> {
         transmittance: Vec3,
         tables: Option<&'a DielectricTables>,
     ) -> Self {
-        let bends = (eta_inside_over_outside - 1.0).abs() >= SMALLEST_INDEX_STEP;
+        let bends = (eta_inside_over_outside - 1.0).abs() >= MIN_INDEX_STEP;
         Self {
             eta_inside_over_outside,
             transmittance,
@@ -87,7 +87,7 @@ impl<'a> Dielectric<'a> {
     fn near(&self, facets: &Facets<'a>, wo: Vec3) -> Near<'a> {
         let (side, up) = if wo.z > 0.0 { (Side::Outside, wo) } else { (Side::Inside, turn(wo)) };
         let compensation = facets.tables.map(|tables| tables.compensation(&facets.microfacets, side));
-        let single_share = compensation.map_or(1.0, |c| (1.0 - c.near.at(up)).clamp(0.05, LARGEST_SINGLE_SHARE));
+        let single_share = compensation.map_or(1.0, |c| (1.0 - c.near.at(up)).clamp(0.05, MAX_SINGLE_SHARE));
         let compensation_reflects = compensation.map_or(0.0, |c| {
             let reflected = 1.0 - c.transmitted_share;
             reflected / (reflected + c.transmitted_share * self.transmittance.max_element())

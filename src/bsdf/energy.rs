@@ -23,7 +23,7 @@ use std::sync::LazyLock;
 
 /// Most of the samples that may go to single scattering. The rest keeps the compensation reachable where the energy
 /// that it gives back is too small for single precision to tell 1 − E from 0.
-pub(crate) const LARGEST_SINGLE_SHARE: f32 = 0.9999;
+pub(crate) const MAX_SINGLE_SHARE: f32 = 0.9999;
 
 /// Kulla and Conty's lobe without its tint, times cos θi: the light that single scattering loses, given by
 /// `missing` = 1 − E.

@@ -57,7 +57,7 @@ impl HeTorrance {
     /// The parameters as in the file's head: indices at least 0, lengths above 0 nm (a height of 0 is a mirror).
     pub fn new(eta: Vec3, k: Vec3, height_nm: f32, correlation_nm: f32, diffuse: Vec3) -> Self {
         let correlation_nm = correlation_nm.max(1.0);
-        let alpha = (2.0 * height_nm / correlation_nm).clamp(2.0 * super::SMALLEST_ALPHA, 1.0);
+        let alpha = (2.0 * height_nm / correlation_nm).clamp(2.0 * super::MIN_ALPHA, 1.0);
         Self {
             eta,
             k,
@@ -239,8 +239,8 @@ impl HeTorrance {
 /// The terms are Poisson weights times a smooth function of m; where g is large that function is expanded to
 /// second order around m = g.
 fn series(g: f32, x: f32) -> f32 {
-    const LARGEST_SUMMED: f32 = 40.0;
-    if g > LARGEST_SUMMED {
+    const MAX_SUMMED: f32 = 40.0;
+    if g > MAX_SUMMED {
         let k = x / g;
         let bent = k.min(g);
         return (-k + (bent * bent - 4.0 * bent + 2.0) / (2.0 * g)).exp() / g;

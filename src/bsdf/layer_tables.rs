@@ -30,7 +30,7 @@ use std::fmt;
 /// Columns of the table, equally spaced in √μ: steep where light grazes.
 pub(super) const COLUMNS: usize = 32;
 /// Averages divide, and are never 0.
-const SMALLEST_AVERAGE: f32 = 1e-9;
+const MIN_AVERAGE: f32 = 1e-9;
 
 /// What is tabulated, at one direction outside.
 #[derive(Clone, Copy, Debug, Default)]
@@ -101,8 +101,8 @@ impl LayerTables {
     /// The tables for such facets of coat and metal.
     pub(super) fn curve(&self, coat: &Microfacets, base: &Microfacets) -> LayerCurve<'_> {
         let mut curve = LayerCurve {
-            cells: [&self.cells[0]; MOST_CELLS],
-            weights: [0.0; MOST_CELLS],
+            cells: [&self.cells[0]; MAX_CELLS],
+            weights: [0.0; MAX_CELLS],
             average_second: 0.0,
             average_later: 0.0,
             later_escape: 0.0,
@@ -112,15 +112,15 @@ impl LayerTables {
         for of_coat in self.coat_nodes.beside(coat) {
             for of_base in bases {
                 let weight = of_coat.weight * of_base.weight;
-                if weight > 0.0 && count < MOST_CELLS {
+                if weight > 0.0 && count < MAX_CELLS {
                     let cell = &self.cells[of_coat.index * self.base_nodes.count() + of_base.index];
                     curve.add(count, cell, weight);
                     count += 1;
                 }
             }
         }
-        curve.average_second = curve.average_second.max(SMALLEST_AVERAGE);
-        curve.average_later = curve.average_later.max(SMALLEST_AVERAGE);
+        curve.average_second = curve.average_second.max(MIN_AVERAGE);
+        curve.average_later = curve.average_later.max(MIN_AVERAGE);
         curve
     }
 }
@@ -156,7 +156,7 @@ pub(super) fn seen_through(base: Microfacets, coat: &Coat<'_>) -> Option<Microfa
     };
     let turn = 1.0 - 1.0 / coat.eta;
     let widen = |alpha: f32, coat_alpha: f32| {
-        (alpha * alpha + 0.5 * turn * turn * coat_alpha * coat_alpha).sqrt().max(super::SMALLEST_ALPHA)
+        (alpha * alpha + 0.5 * turn * turn * coat_alpha * coat_alpha).sqrt().max(super::MIN_ALPHA)
     };
     let ([x, y], [coat_x, coat_y]) = (base.alphas(), coat_facets.alphas());
     Some(Microfacets::new(widen(x, coat_x), widen(y, coat_y), base.distribution()))
@@ -191,13 +191,13 @@ impl Cell {
 
 /// Cells between which widths may lie: two for each width that a texture gives, of which [`WidthNodes`] has three at
 /// most.
-const MOST_CELLS: usize = 8;
+const MAX_CELLS: usize = 8;
 
 /// The table at the widths of coat and metal: the cells beside them and their weights.
 #[derive(Clone, Copy)]
 pub(super) struct LayerCurve<'a> {
-    cells: [&'a Cell; MOST_CELLS],
-    weights: [f32; MOST_CELLS],
+    cells: [&'a Cell; MAX_CELLS],
+    weights: [f32; MAX_CELLS],
     /// Cosine-weighted averages of what enters and leaves after two reflections, or more; above 0.
     pub(super) average_second: f32,
     pub(super) average_later: f32,

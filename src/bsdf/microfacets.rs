@@ -9,7 +9,7 @@
 //! Dupuy & A. Benyoub, *Sampling visible GGX normals with spherical caps* (2023), listing 3. Visible Beckmann
 //! normals: see [`super::beckmann`].
 
-use super::{SMALLEST_ALPHA, beckmann, warp};
+use super::{MIN_ALPHA, beckmann, warp};
 use crate::scene::Distribution;
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -42,12 +42,8 @@ impl Microfacets {
 
     /// The distribution with widths that it can be evaluated with, or `None` where the surface counts as smooth.
     pub(crate) fn rough(self) -> Option<Self> {
-        let is_rough = self.alpha_x.max(self.alpha_y) >= SMALLEST_ALPHA;
-        is_rough.then(|| Self {
-            alpha_x: self.alpha_x.max(SMALLEST_ALPHA),
-            alpha_y: self.alpha_y.max(SMALLEST_ALPHA),
-            ..self
-        })
+        let is_rough = self.alpha_x.max(self.alpha_y) >= MIN_ALPHA;
+        is_rough.then(|| Self { alpha_x: self.alpha_x.max(MIN_ALPHA), alpha_y: self.alpha_y.max(MIN_ALPHA), ..self })
     }
 
     /// Which shape the distribution has.

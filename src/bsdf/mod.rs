@@ -73,7 +73,7 @@ pub use ward::Ward;
 
 /// Slope width α below which a microfacet surface counts as perfectly smooth. Its lobe would be 0.06° wide: less than a
 /// pixel of any display at any distance, and the half-way vector in single precision starts to blur it.
-pub const SMALLEST_ALPHA: f32 = 1e-3;
+pub const MIN_ALPHA: f32 = 1e-3;
 
 /// What [`Bsdf::evaluate`] tells of one pair of directions.
 #[derive(Clone, Copy, Debug, PartialEq)]

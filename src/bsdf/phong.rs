@@ -23,14 +23,14 @@ pub struct Phong {
 }
 
 /// Beyond this the lobe is narrower than single precision can place it.
-const LARGEST_EXPONENT: f32 = 1e6;
+const MAX_EXPONENT: f32 = 1e6;
 
 impl Phong {
     /// The parameters as in the file's head.
     pub fn new(diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
         let total = diffuse.max_element() + specular.max_element();
         let specular_share = if total > 0.0 { specular.max_element() / total } else { 0.0 };
-        Self { diffuse, specular, exponent: exponent.clamp(0.0, LARGEST_EXPONENT), specular_share }
+        Self { diffuse, specular, exponent: exponent.clamp(0.0, MAX_EXPONENT), specular_share }
     }
 
     /// Right face on; the lobe's loss towards grazing angles is left out.

@@ -23,10 +23,10 @@ pub(super) struct Sheen {
 }
 
 /// Exponents beyond 1/this would crowd at grazing angles only.
-const SMALLEST_ALPHA: f32 = 0.01;
+const MIN_ALPHA: f32 = 0.01;
 
 fn inverse_alpha(alpha: f32) -> f32 {
-    1.0 / alpha.max(SMALLEST_ALPHA)
+    1.0 / alpha.max(MIN_ALPHA)
 }
 
 /// Charlie's distribution and Neubelt's visibility, cosine of `wi` included.

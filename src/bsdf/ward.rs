@@ -9,7 +9,7 @@
 //! θo + cos θi)⁴ in place of Ward's 1/(4√(cos θo cos θi)) keeps albedo at most 1 up to grazing angles and sample
 //! weights at most 2. Not for metals by index: there is no Fresnel effect.
 
-use super::{BsdfEvaluation, Reflector, SMALLEST_ALPHA, warp};
+use super::{BsdfEvaluation, MIN_ALPHA, Reflector, warp};
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -32,8 +32,8 @@ impl Ward {
         Self {
             diffuse,
             specular,
-            alpha_x: alpha_x.clamp(SMALLEST_ALPHA, 1.0),
-            alpha_y: alpha_y.clamp(SMALLEST_ALPHA, 1.0),
+            alpha_x: alpha_x.clamp(MIN_ALPHA, 1.0),
+            alpha_y: alpha_y.clamp(MIN_ALPHA, 1.0),
             specular_share,
         }
     }

@@ -2,7 +2,7 @@
 //! with is left to the callers.
 
 use super::{Checkpoint, Header};
-use crate::adaptive::audit::MOST_INFLATION;
+use crate::adaptive::audit::MAX_INFLATION;
 use crate::adaptive::state::{RenderState, Seconds, can_be_seconds};
 use crate::output::OutputError;
 use crate::sealed::{Kind, SealedError};
@@ -110,7 +110,7 @@ fn check(header: &Header, state: &RenderState) -> Result<(), &'static str> {
         || !header.earlier_visibilities.iter().all(|&visibility| is_rung(visibility))
         || !state.finished_rung.is_none_or(is_rung)
         || !state.left_rung.is_none_or(is_rung)
-        || !(1.0..=MOST_INFLATION).contains(&state.inflation)
+        || !(1.0..=MAX_INFLATION).contains(&state.inflation)
         || !exposure.is_finite()
         || ![total, perception, allocation, denoising].into_iter().all(can_be_seconds)
     {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// Bounds the memory of machines with many threads; more than that no disk feeds.
-const MOST_READ_AT_ONCE: usize = 8;
+const MAX_READ_AT_ONCE: usize = 8;
 
 /// Why films could not be merged.
 #[derive(Debug, thiserror::Error)]
@@ -60,7 +60,7 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
         Ok::<_, CheckpointError>(if is_sum { balanced(film) } else { film })
     };
     let mut sum = read_same(first)?;
-    for batch in rest.chunks(rayon::current_num_threads().clamp(1, MOST_READ_AT_ONCE)) {
+    for batch in rest.chunks(rayon::current_num_threads().clamp(1, MAX_READ_AT_ONCE)) {
         let read: Vec<_> = batch.par_iter().map(&read_same).collect();
         batch.iter().zip(read).try_for_each(|(file, film)| add(&mut sum, first, file, film?))?;
     }

@@ -64,14 +64,14 @@ pub(super) struct AnimateArguments {
     quality: Option<Quality>,
     /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most; for uniform
     /// sampling as many in each.
-    #[arg(long, value_name = "N", value_parser = whole(1..=Film::MOST_SAMPLES_A_PIXEL), allow_negative_numbers = true, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=Film::MAX_SAMPLES_PER_PIXEL), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
     /// A budget of this many seconds for all frames that are rendered, spent on those that need it most; for uniform sampling as
     /// many on each.
     #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true, conflicts_with = "spp", help_heading = "Until")]
     time: Option<Duration>,
     /// Most samples of one pixel, at least 16.
-    #[arg(long, value_name = "N", value_parser = whole(16..=Film::MOST_SAMPLES_A_PIXEL), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(16..=Film::MAX_SAMPLES_PER_PIXEL), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
     max_spp: u32,
     /// How samples are spread.
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]

@@ -1,9 +1,9 @@
 //! The option `--denoise`, and the pilot that it asks for. Whether the library is there is not known here.
 
 use clap::ValueEnum;
-use fechner::adaptive::settings::DENOISED_PILOT_SAMPLES_A_PIXEL;
+use fechner::adaptive::settings::DENOISED_PILOT_SAMPLES_PER_PIXEL;
 use fechner::denoise::DenoiserKind;
-use fechner::integrator::PILOT_SAMPLES_A_PIXEL;
+use fechner::integrator::PILOT_SAMPLES_PER_PIXEL;
 
 /// What makes the output picture out of the mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -29,6 +29,6 @@ impl DenoiseChoice {
 
     /// Samples of every pixel before the first look.
     pub(super) fn pilot_samples(self) -> u32 {
-        if self == Self::None { PILOT_SAMPLES_A_PIXEL } else { DENOISED_PILOT_SAMPLES_A_PIXEL }
+        if self == Self::None { PILOT_SAMPLES_PER_PIXEL } else { DENOISED_PILOT_SAMPLES_PER_PIXEL }
     }
 }

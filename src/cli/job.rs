@@ -69,10 +69,10 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, help_heading = "Until")]
     time: Option<Duration>,
     /// Stop at this mean number of samples a pixel.
-    #[arg(long, value_name = "N", value_parser = whole(1..=Film::MOST_SAMPLES_A_PIXEL), allow_negative_numbers = true, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=Film::MAX_SAMPLES_PER_PIXEL), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
     /// Most samples of one pixel, at least 16.
-    #[arg(long, value_name = "N", value_parser = whole(16..=Film::MOST_SAMPLES_A_PIXEL), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(16..=Film::MAX_SAMPLES_PER_PIXEL), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
     max_spp: u32,
     /// Stop after this many plans: repeats a render that ended by --time.
     #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
@@ -283,8 +283,8 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
 /// whole. `None` for pictures too large to be looked at as a whole.
 fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> {
     /// 8192×4096, for which a third of a gigabyte is taken.
-    const MOST_PIXELS: u64 = 1 << 25;
-    if u64::from(trace.width) * u64::from(trace.height) > MOST_PIXELS {
+    const MAX_PIXELS: u64 = 1 << 25;
+    if u64::from(trace.width) * u64::from(trace.height) > MAX_PIXELS {
         say!("note: tone is fitted to the film alone: {}x{} pixels are too many", trace.width, trace.height);
         return None;
     }

@@ -31,9 +31,9 @@ pub(super) struct Keeper {
 /// Intervals from which on the tracer's own batches, of seconds, come often enough.
 const LONG_INTERVAL: Duration = Duration::from_secs(30);
 /// Fewest samples of a batch: a tenth of a second of slow ones.
-const LEAST_BATCH: u64 = 1 << 12;
+const MIN_BATCH: u64 = 1 << 12;
 /// Batches take so many times what it takes to write the film, or all of the time is spent in writing it.
-const WRITES_A_BATCH: f64 = 4.0;
+const WRITES_PER_BATCH: f64 = 4.0;
 /// Batches in an interval, so that films are kept when it ends. Measured with the tracer's own batches: films that are
 /// to be kept every second are kept every 2 to 4.
 const BATCHES_AN_INTERVAL: f64 = 8.0;
@@ -90,9 +90,9 @@ impl Keeper {
         }
         let history = self.history.lock().unpoisoned();
         let seconds_of_interval = self.every.as_secs_f64() / BATCHES_AN_INTERVAL;
-        let seconds = seconds_of_interval.max(WRITES_A_BATCH * history.longest_write.as_secs_f64());
+        let seconds = seconds_of_interval.max(WRITES_PER_BATCH * history.longest_write.as_secs_f64());
         let of_pace = |pace: f64| (pace * seconds) as u64;
-        history.samples_a_second.map_or(LEAST_BATCH, of_pace).max(LEAST_BATCH)
+        history.samples_a_second.map_or(MIN_BATCH, of_pace).max(MIN_BATCH)
     }
 
     /// After a look, which is no part of a batch.
@@ -211,12 +211,12 @@ mod tests {
             Keeper::new(&arguments, header(), SeedsSoFar::of_one(0))
         };
         let often = of(Duration::from_secs(16));
-        assert_eq!((often.most_samples_a_batch(), of(EVERY).most_samples_a_batch()), (LEAST_BATCH, u64::MAX));
+        assert_eq!((often.most_samples_a_batch(), of(EVERY).most_samples_a_batch()), (MIN_BATCH, u64::MAX));
         let tell = |pace: f64, longest_write: Duration| {
             let mut history = often.history.lock().expect("one thread");
             (history.samples_a_second, history.longest_write) = (Some(pace), longest_write);
         };
-        for (pace, write_seconds, samples) in [(1e6, 0, 2_000_000), (1e6, 3, 12_000_000), (10.0, 0, LEAST_BATCH)] {
+        for (pace, write_seconds, samples) in [(1e6, 0, 2_000_000), (1e6, 3, 12_000_000), (10.0, 0, MIN_BATCH)] {
             tell(pace, Duration::from_secs(write_seconds));
             assert_eq!(often.most_samples_a_batch(), samples);
         }

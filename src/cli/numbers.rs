@@ -1,6 +1,6 @@
 //! Numbers of arguments, refused in words that say what would be right.
 
-use fechner::scene::{MOST_EXPOSURE_STOPS, NITS_PER_UNIT};
+use fechner::scene::{MAX_EXPOSURE_STOPS, NITS_PER_UNIT};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -22,8 +22,8 @@ pub(super) fn parse_seed(text: &str) -> Result<u64, String> {
 
 /// A time above 0 s, of thirty years at most: more is as good as no limit, and clocks must be able to add it.
 pub(super) fn parse_seconds(text: &str) -> Result<Duration, String> {
-    const MOST_SECONDS: f64 = 1e9;
-    parse_positive(text).map(|seconds| Duration::from_secs_f64(seconds.min(MOST_SECONDS)))
+    const MAX_SECONDS: f64 = 1e9;
+    parse_positive(text).map(|seconds| Duration::from_secs_f64(seconds.min(MAX_SECONDS)))
 }
 
 /// A number above 0.
@@ -63,8 +63,8 @@ pub(super) fn parse_finite(text: &str) -> Result<f64, String> {
 /// A number of stops that operators know.
 pub(super) fn parse_stops(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(stops) if stops.abs() <= MOST_EXPOSURE_STOPS => Ok(stops),
-        _ => Err(format!("\"{text}\" is not a number of stops from -{MOST_EXPOSURE_STOPS} to {MOST_EXPOSURE_STOPS}")),
+        Ok(stops) if stops.abs() <= MAX_EXPOSURE_STOPS => Ok(stops),
+        _ => Err(format!("\"{text}\" is not a number of stops from -{MAX_EXPOSURE_STOPS} to {MAX_EXPOSURE_STOPS}")),
     }
 }
 

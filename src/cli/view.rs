@@ -14,7 +14,7 @@ use fechner::checkpoint::SettingsRecord;
 use fechner::integrator::{Crop, TraceSettings};
 use fechner::output::{self, PartOf};
 use fechner::poison::Unpoisoned as _;
-use fechner::preview::{self, Audience, Door, Host, Job, MOST_SIDE_PIXELS, Options, Spectator};
+use fechner::preview::{self, Audience, Door, Host, Job, MAX_SIDE_PIXELS, Options, Spectator};
 use fechner::scene::{Scene, load};
 use fechner_perception::model;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, UdpSocket};
@@ -97,9 +97,9 @@ fn shown_in_browsers(prepared: Prepared) -> anyhow::Result<Prepared> {
 
 fn check_shown(trace: &TraceSettings) -> anyhow::Result<()> {
     let Crop { width, height, .. } = trace.film_area();
-    if width.max(height) > MOST_SIDE_PIXELS {
+    if width.max(height) > MAX_SIDE_PIXELS {
         bail!(
-            "a browser shows pictures of at most {MOST_SIDE_PIXELS} pixels a side, and this one has {width}x{height}: choose a smaller \
+            "a browser shows pictures of at most {MAX_SIDE_PIXELS} pixels a side, and this one has {width}x{height}: choose a smaller \
              --size, or a --crop of it"
         );
     }

@@ -210,8 +210,8 @@ impl Keeping<'_> {
 
 /// Samples between two wishes: half a second in a simple scene. Schedulers kill 30 seconds after they asked.
 pub(super) fn most_samples_a_batch() -> u64 {
-    const MOST_SAMPLES_A_THREAD: u64 = 1 << 17;
-    MOST_SAMPLES_A_THREAD * rayon::current_num_threads() as u64
+    const MAX_SAMPLES_PER_THREAD: u64 = 1 << 17;
+    MAX_SAMPLES_PER_THREAD * rayon::current_num_threads() as u64
 }
 
 /// Samples what an order asks for after `begun`, and writes the sums: a checkpoint every so often and where it is

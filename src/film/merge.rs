@@ -3,17 +3,17 @@
 
 use super::{Film, HalfPixel, Moments, PixelGuide};
 use crate::sampler::Half;
-use fechner_perception::PIXELS_A_TASK;
+use fechner_perception::PIXELS_PER_TASK;
 use rayon::prelude::*;
 
 /// Most samples of a pixel's half that a film may hold: sums of a few films stay far from where counts wrap around.
-const MOST_TAKEN: u32 = 1 << 29;
+const MAX_TAKEN: u32 = 1 << 29;
 
 impl Film {
     /// Most samples of a pixel that a film may hold.
-    pub const MOST_SAMPLES_A_PIXEL: u32 = 2 * MOST_TAKEN;
+    pub const MAX_SAMPLES_PER_PIXEL: u32 = 2 * MAX_TAKEN;
     /// Most pixels that a film may have: they are numbered by `u32`, and halves of them counted.
-    pub const MOST_PIXELS: u32 = u32::MAX / 2;
+    pub const MAX_PIXELS: u32 = u32::MAX / 2;
 
     /// Adds the samples of another film, half to half: as if one film had taken both. The other must be of this size
     /// and of other random numbers.
@@ -25,7 +25,7 @@ impl Film {
     /// For a film of another size.
     pub fn add(&mut self, other: &Film) -> Result<(), &'static str> {
         assert_eq!((self.width, self.height), (other.width, other.height), "films of one size");
-        let overflows = |(own, others): (&HalfPixel, &HalfPixel)| own.taken.saturating_add(others.taken) > MOST_TAKEN;
+        let overflows = |(own, others): (&HalfPixel, &HalfPixel)| own.taken.saturating_add(others.taken) > MAX_TAKEN;
         if self.halves.iter().zip(&other.halves).any(|(own, others)| own.iter().zip(others).any(overflows)) {
             return Err("a pixel would have more samples than can be counted");
         }
@@ -33,7 +33,7 @@ impl Film {
         let [other_a, other_b] = &other.halves;
         let pixels = (&mut self.guides, &mut self.guides_of_a, a, b).into_par_iter();
         let others = (&other.guides, &other.guides_of_a, other_a, other_b).into_par_iter();
-        pixels.zip(others).with_min_len(PIXELS_A_TASK).for_each(
+        pixels.zip(others).with_min_len(PIXELS_PER_TASK).for_each(
             |((guide, guide_of_a, a, b), (other_guide, other_guide_of_a, other_a, other_b))| {
                 guide.add(other_guide, a.samples + b.samples, other_a.samples + other_b.samples);
                 guide_of_a.add(other_guide_of_a, a.samples, other_a.samples);
@@ -67,7 +67,7 @@ impl Film {
     /// Says what is wrong.
     pub fn check(&self) -> Result<(), &'static str> {
         let pixels = u64::from(self.width) * u64::from(self.height);
-        if pixels == 0 || pixels > u64::from(Self::MOST_PIXELS) {
+        if pixels == 0 || pixels > u64::from(Self::MAX_PIXELS) {
             return Err("its size makes no sense");
         }
         let lengths = [self.halves[0].len(), self.halves[1].len(), self.guides.len(), self.guides_of_a.len()];
@@ -77,7 +77,7 @@ impl Film {
         let is_sound = |pixel: &HalfPixel| {
             pixel.missed <= pixel.samples
                 && pixel.samples <= pixel.taken
-                && pixel.taken <= MOST_TAKEN
+                && pixel.taken <= MAX_TAKEN
                 && pixel.mean.iter().all(|mean| mean.is_finite())
                 && pixel.m2.iter().all(|m2| m2.is_finite() && *m2 >= 0.0)
         };
@@ -170,7 +170,7 @@ mod tests {
     fn a_sum_that_cannot_be_counted_is_not_begun() {
         let film = film_of(&[1.0, 2.0]);
         let mut full = film.clone();
-        full.halves[1][0].taken = MOST_TAKEN;
+        full.halves[1][0].taken = MAX_TAKEN;
         let mut sum = film.clone();
         sum.add(&full).expect_err("too many");
         assert_eq!(sum, film);

@@ -68,11 +68,11 @@ fn stretched_frame(material: &Material, textures: &[Texture], point: &SurfacePoi
 fn seen_side(normal: Vec3, geometric_normal: Vec3, wo: Vec3) -> Vec3 {
     let facing = if wo.dot(geometric_normal) >= 0.0 { 1.0 } else { -1.0 };
     let cosine = facing * wo.dot(normal);
-    const LEAST_COSINE: f32 = 0.01;
-    if cosine >= LEAST_COSINE {
+    const MIN_COSINE: f32 = 0.01;
+    if cosine >= MIN_COSINE {
         return normal;
     }
-    (normal + facing * wo * (LEAST_COSINE - cosine)).normalize_or(geometric_normal)
+    (normal + facing * wo * (MIN_COSINE - cosine)).normalize_or(geometric_normal)
 }
 
 /// Whether a surface scatters nothing into directions of its own.

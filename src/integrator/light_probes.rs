@@ -2,7 +2,7 @@
 //! lights by it.
 
 use super::shading::Components;
-use super::thin_sheets::MOST_SHEETS;
+use super::thin_sheets::MAX_SHEETS;
 use super::{CameraSample, PathTracer};
 use crate::geometry::{Ray, SurfacePoint};
 use crate::light::{LightProbe, LightSample};
@@ -84,7 +84,7 @@ impl PathTracer {
     fn arrival(&self, place: &Place, sample: &LightSample) -> f32 {
         let shadow_ray = self.shadow_ray(&place.point, sample, place.probe.time);
         if self.has_sheets {
-            return self.through_sheets(&shadow_ray, MOST_SHEETS).share.max_element().min(1.0);
+            return self.through_sheets(&shadow_ray, MAX_SHEETS).share.max_element().min(1.0);
         }
         if self.is_hidden(&shadow_ray) { 0.0 } else { 1.0 }
     }

@@ -122,9 +122,9 @@ impl Media {
     /// The volumes that a ray leaves without having entered them, outermost first.
     fn left_by(world: &World, mut ray: Ray) -> Nested<Medium> {
         // More than that are no boundaries of volumes.
-        const MOST_CROSSED: usize = 10_000;
+        const MAX_CROSSED: usize = 10_000;
         let (mut entered, mut around) = (Nested::new(), Nested::new());
-        for _ in 0..MOST_CROSSED {
+        for _ in 0..MAX_CROSSED {
             let Some(hit) = world.closest(&ray) else { break };
             let point = world.surface(&ray, &hit);
             let material = world.material_of(hit.object);

@@ -137,7 +137,7 @@ pub struct BlockWork {
 }
 
 impl BlockWork {
-    /// The whole block: the pilot has [`PILOT_SAMPLES_A_HALF`], and each level doubles the total.
+    /// The whole block: the pilot has [`PILOT_SAMPLES_PER_HALF`], and each level doubles the total.
     pub fn whole(pixel: u32, half: Half, level: u8) -> Self {
         Self { pixel, half, level, first: 0, samples: 1 << log2_block(level) }
     }
@@ -151,7 +151,7 @@ impl BlockWork {
 
     /// What is left of the doubling that a half is in after `taken` samples.
     pub fn rest(pixel: u32, half: Half, taken: u32) -> Self {
-        let level = if taken < PILOT_SAMPLES_A_HALF { 0 } else { 1 + (taken / PILOT_SAMPLES_A_HALF).ilog2() as u8 };
+        let level = if taken < PILOT_SAMPLES_PER_HALF { 0 } else { 1 + (taken / PILOT_SAMPLES_PER_HALF).ilog2() as u8 };
         let whole = Self::whole(pixel, half, level);
         let first = if level == 0 { taken } else { taken - whole.samples };
         Self { first, samples: whole.samples - first, ..whole }
@@ -159,17 +159,17 @@ impl BlockWork {
 }
 
 /// Samples of the pilot in each half.
-pub const PILOT_SAMPLES_A_HALF: u32 = 8;
+pub const PILOT_SAMPLES_PER_HALF: u32 = 8;
 
 /// Samples of the pilot in both.
-pub const PILOT_SAMPLES_A_PIXEL: u32 = 2 * PILOT_SAMPLES_A_HALF;
+pub const PILOT_SAMPLES_PER_PIXEL: u32 = 2 * PILOT_SAMPLES_PER_HALF;
 
 /// The last level of which a sample's number fits 32 bits: its block ends at 2³⁰ samples of the half.
 const HIGHEST_LEVEL: u8 = 27;
 
 /// log₂ of the samples of a level's whole block.
 fn log2_block(level: u8) -> u8 {
-    PILOT_SAMPLES_A_HALF.ilog2() as u8 + level.saturating_sub(1)
+    PILOT_SAMPLES_PER_HALF.ilog2() as u8 + level.saturating_sub(1)
 }
 
 /// What to trace next. Plain data: deciding it and doing it are two things.

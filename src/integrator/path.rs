@@ -6,7 +6,7 @@
 use super::PathTracer;
 use super::media::Media;
 use super::shading::{Components, Shading};
-use super::thin_sheets::{MOST_SHEETS, Passed};
+use super::thin_sheets::{MAX_SHEETS, Passed};
 use crate::geometry::{Hit, Ray, SurfacePoint, offset};
 use crate::light::{LightFromAfar, LightReceiver, LightSample, emitted};
 use crate::sampler::Sample;
@@ -322,7 +322,7 @@ impl PathTracer {
         };
         // The shadow ray that it waits for.
         let shadow_ray = self.shadow_ray(point, &light, path.ray.time);
-        let most_sheets = if self.has_sheets { MOST_SHEETS.min(self.settings.max_depth - bounce - 1) } else { 0 };
+        let most_sheets = if self.has_sheets { MAX_SHEETS.min(self.settings.max_depth - bounce - 1) } else { 0 };
         path.direct = Some(DirectLight { shadow_ray, most_sheets, radiance: unshadowed * left / survival });
     }
 
@@ -380,7 +380,7 @@ fn pass_sheet(path: &mut PathState, hit: &Hit, point: &SurfacePoint, share: Vec3
     path.throughput *= share;
     path.behind.distance += hit.distance;
     path.behind.sheets += 1;
-    if path.behind.sheets > MOST_SHEETS {
+    if path.behind.sheets > MAX_SHEETS {
         path.scatter_pdf = None;
     }
     path.ray = Ray { origin: point.spawn(path.ray.direction.into()), ..path.ray };
@@ -392,11 +392,11 @@ fn survives(path: &mut PathState, bounce: u32, u: f32) -> bool {
     const FIRST_BOUNCE: u32 = 3;
     /// No path goes on for ever, even where nothing absorbs: [`super::DEFAULT_MAX_DEPTH`] counts on both.
     const ALWAYS_MORTAL_FROM: u32 = 8;
-    const MOST_SURVIVAL: f32 = 0.98;
+    const MAX_SURVIVAL: f32 = 0.98;
     if bounce < FIRST_BOUNCE {
         return true;
     }
-    let most = if bounce < ALWAYS_MORTAL_FROM { 1.0 } else { MOST_SURVIVAL };
+    let most = if bounce < ALWAYS_MORTAL_FROM { 1.0 } else { MAX_SURVIVAL };
     let survival = (path.throughput.max_element() * path.radiance_gain_on_exit).min(most);
     if u >= survival {
         return false;

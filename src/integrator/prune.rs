@@ -21,10 +21,10 @@ pub struct Pruning {
 /// log₂ of the darkest luminance in cd/m² that the table tells apart.
 const DARKEST: f32 = -20.0;
 /// Entries of the table for each doubling of luminance.
-const STEPS_A_DOUBLING: f32 = 4.0;
+const STEPS_PER_DOUBLING: f32 = 4.0;
 const ENTRIES: usize = 200;
 /// Light is never traced less often, so what gets through is never multiplied by more than the inverse.
-const LEAST_SURVIVAL: f32 = 0.125;
+const MIN_SURVIVAL: f32 = 0.125;
 
 /// Thresholds at luminances a quarter of a doubling apart, all in scene units.
 pub(super) struct ThresholdTable {
@@ -34,17 +34,17 @@ pub(super) struct ThresholdTable {
 
 impl ThresholdTable {
     pub(super) fn new(Pruning { nits_per_unit }: Pruning) -> Self {
-        let luminance_cd_m2 = |entry: usize| f64::from(DARKEST + entry as f32 / STEPS_A_DOUBLING).exp2();
+        let luminance_cd_m2 = |entry: usize| f64::from(DARKEST + entry as f32 / STEPS_PER_DOUBLING).exp2();
         let threshold = |entry: usize| (combined_monotone(luminance_cd_m2(entry)) / nits_per_unit) as f32;
         Self { nits_per_unit: nits_per_unit as f32, thresholds: (0..ENTRIES).map(threshold).collect() }
     }
 
     /// Share of the times that a change of luminance beside a luminance seen is to be traced, both in scene units.
     pub(super) fn survival(&self, change: f32, seen: f32) -> f32 {
-        let entry = STEPS_A_DOUBLING * ((self.nits_per_unit * seen).log2() - DARKEST);
+        let entry = STEPS_PER_DOUBLING * ((self.nits_per_unit * seen).log2() - DARKEST);
         let nearest = (entry + 0.5).clamp(0.0, (ENTRIES - 1) as f32) as usize;
         let share = change / self.thresholds[nearest];
-        if share.is_nan() { 1.0 } else { share.clamp(LEAST_SURVIVAL, 1.0) }
+        if share.is_nan() { 1.0 } else { share.clamp(MIN_SURVIVAL, 1.0) }
     }
 }
 
@@ -62,10 +62,10 @@ mod tests {
             assert_eq!(survival(6.0, 100.0), 1.0);
             let half = 0.5 * combined_monotone(100.0);
             assert!((survival(half, 100.0) - 0.5).abs() < 0.05, "{}", survival(half, 100.0));
-            assert_eq!(survival(1e-6, 100.0), LEAST_SURVIVAL);
+            assert_eq!(survival(1e-6, 100.0), MIN_SURVIVAL);
             assert_eq!(survival(0.01, 0.0), 1.0, "in the dark a hundredth of a cd/m² is seen");
             assert_eq!(survival(f64::NAN, 100.0), 1.0);
-            assert_eq!(survival(1.0, f64::INFINITY), LEAST_SURVIVAL);
+            assert_eq!(survival(1.0, f64::INFINITY), MIN_SURVIVAL);
         }
     }
 }

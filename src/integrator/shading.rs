@@ -32,7 +32,7 @@ pub(super) struct Shading<'a> {
 /// Components of a mix, two for each of its nodes: a place to stay for what the mix refers to, on the stack of the
 /// path.
 pub(super) struct Components<'a> {
-    cells: [OnceCell<Bsdf<'a>>; 2 * (Surface::MOST_COMPONENTS - 1)],
+    cells: [OnceCell<Bsdf<'a>>; 2 * (Surface::MAX_COMPONENTS - 1)],
     used: Cell<usize>,
 }
 

@@ -26,20 +26,20 @@ use spots::{Spot, Spots};
 
 /// Spots that are looked for, and rays that look for them: each from fewer points of the lens where there are many.
 /// The rest is left to chance.
-const MOST_RAYS: usize = 1 << 18;
+const MAX_RAYS: usize = 1 << 18;
 /// Pixels that spots are spread over, one after the other, some 0.2 s. The rest is left to chance.
-const MOST_PIXELS: f64 = (1 << 26) as f64;
+const MAX_PIXELS: f64 = (1 << 26) as f64;
 /// Points of the lens, squared, from which each spot is looked for that is blurred, where there are rays enough.
-const LENS_POINTS_A_SIDE: usize = 8;
-const LENS_POINTS: usize = LENS_POINTS_A_SIDE * LENS_POINTS_A_SIDE;
+const LENS_POINTS_PER_SIDE: usize = 8;
+const LENS_POINTS: usize = LENS_POINTS_PER_SIDE * LENS_POINTS_PER_SIDE;
 /// Moments at which what moves is looked for, where there are rays enough; in between it is taken to go straight.
-const MOST_MOMENTS: usize = 64;
+const MAX_MOMENTS: usize = 64;
 /// Points of the lens of each of them, others from one to the next.
 const LENS_POINTS_OF_A_MOMENT: usize = 4;
 /// With fewer it is left to chance.
-const FEWEST_MOMENTS: usize = 8;
+const MIN_MOMENTS: usize = 8;
 /// Spots of lit things over the triangles and spheres that are looked at, at most.
-const SPOTS_A_FACET: usize = 4;
+const SPOTS_PER_FACET: usize = 4;
 
 /// What is looked for.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -96,12 +96,12 @@ impl PathTracer {
     }
 
     fn look_for(&self, kind: Kind, shares: &mut Shares) {
-        let (mut pixels_left, mut rays_left) = (MOST_PIXELS, MOST_RAYS);
+        let (mut pixels_left, mut rays_left) = (MAX_PIXELS, MAX_RAYS);
         for moment in self.moments(kind) {
             let camera = self.camera.at(moment.time);
             let spots = self.bright_spots(&camera, self.spots_at(kind, &moment), &moment);
             let most = if moment.which == Which::Moving { LENS_POINTS_OF_A_MOMENT } else { LENS_POINTS };
-            let points_of_each = (MOST_RAYS / moment.of / spots.len().max(1)).clamp(1, most);
+            let points_of_each = (MAX_RAYS / moment.of / spots.len().max(1)).clamp(1, most);
             for (number, BrightSpot { spot, luminance }) in spots.iter().enumerate() {
                 let lens = lens_points(spot, (moment.number + number) * points_of_each, points_of_each);
                 let way_px = spot.velocity_px / moment.of as f32;
@@ -135,8 +135,8 @@ impl PathTracer {
         };
         let parts = self.parts_at(kind, Which::Moving, 0.0).count();
         let spots = if parts == 0 { 0 } else { moving(1).map(|moment| self.spots_at(kind, &moment).len()).sum() };
-        let afforded = self.most_parts(kind).checked_div(parts.max(spots)).unwrap_or(0).min(MOST_MOMENTS);
-        std::iter::once(resting).chain(moving(if afforded < FEWEST_MOMENTS { 0 } else { afforded }))
+        let afforded = self.most_parts(kind).checked_div(parts.max(spots)).unwrap_or(0).min(MAX_MOMENTS);
+        std::iter::once(resting).chain(moving(if afforded < MIN_MOMENTS { 0 } else { afforded }))
     }
 
     /// What is to be looked for at a moment.
@@ -145,8 +145,8 @@ impl PathTracer {
         let step = 0.5 / moment.of as f32;
         let [camera, camera_later] = [moment.time, moment.time + step].map(|time| self.camera.at(time));
         let most = match kind {
-            Kind::Lamps => MOST_RAYS,
-            Kind::Lit => SPOTS_A_FACET * self.most_parts(kind),
+            Kind::Lamps => MAX_RAYS,
+            Kind::Lit => SPOTS_PER_FACET * self.most_parts(kind),
         };
         let mut spots = Spots::new(camera, camera_later, step, self.settings.film_area(), most);
         let [now, later] = [moment.time, moment.time + step].map(|time| self.parts_at(kind, moment.which, time));
@@ -165,7 +165,7 @@ impl PathTracer {
                 Box::new(all.filter(move |part| is_asked(part.moves)).map(|part| self.part_of_lamp(&part)))
             }
             Kind::Lit => {
-                let moments = if which == Which::Moving { FEWEST_MOMENTS } else { 1 };
+                let moments = if which == Which::Moving { MIN_MOMENTS } else { 1 };
                 Box::new(lit::parts_at(&self.world, self.most_parts(kind) / moments, time, is_asked))
             }
         }
@@ -174,7 +174,7 @@ impl PathTracer {
     /// How many are looked at, at all moments together.
     fn most_parts(&self, kind: Kind) -> usize {
         match kind {
-            Kind::Lamps => MOST_RAYS,
+            Kind::Lamps => MAX_RAYS,
             Kind::Lit => lit::most_facets(self.settings.film_area().pixels()),
         }
     }
@@ -210,7 +210,7 @@ fn lens_points(spot: &Spot, first: usize, count: usize) -> Vec<[f32; 2]> {
     if !spot.is_blurred() {
         return vec![[0.5; 2]];
     }
-    let at = |index: usize| (index as f32 + 0.5) / LENS_POINTS_A_SIDE as f32;
-    let of = |index: usize| [at(index % LENS_POINTS_A_SIDE), at(index / LENS_POINTS_A_SIDE)];
+    let at = |index: usize| (index as f32 + 0.5) / LENS_POINTS_PER_SIDE as f32;
+    let of = |index: usize| [at(index % LENS_POINTS_PER_SIDE), at(index / LENS_POINTS_PER_SIDE)];
     (first..first + count).map(|index| of(index * STRIDE % LENS_POINTS)).collect()
 }

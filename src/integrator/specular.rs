@@ -10,7 +10,7 @@ use glam::{Mat3A, Vec3, Vec3A};
 use smallvec::SmallVec;
 
 /// Mirrors and boundaries that are followed at most: what is seen behind more of them has hardly an image.
-const MOST_VERTICES: usize = 8;
+const MAX_VERTICES: usize = 8;
 
 /// What a perfectly smooth surface does with a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +69,7 @@ impl PathTracer {
             let next = hit.as_ref().and_then(|hit| self.specular_bounce(&ray, hit, None));
             length += hit.as_ref().map_or(f32::INFINITY, |hit| hit.distance);
             match (hit, next) {
-                (Some(hit), Some(bounce)) if vertices.len() < MOST_VERTICES => {
+                (Some(hit), Some(bounce)) if vertices.len() < MAX_VERTICES => {
                     vertices.push(SpecularVertex { object: hit.object, event: bounce.event });
                     if bounce.event == SpecularEvent::Reflected {
                         unfolded *= mirroring(bounce.next.direction - ray.direction);

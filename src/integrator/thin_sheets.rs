@@ -16,7 +16,7 @@ use crate::scene::{Material, Surface};
 use glam::Vec3;
 
 /// Sheets that a shadow ray passes at most; more of them let next to nothing through.
-pub(super) const MOST_SHEETS: u32 = 32;
+pub(super) const MAX_SHEETS: u32 = 32;
 
 /// Whether any of these may be a clear sheet.
 pub(super) fn any_of(materials: &[Material]) -> bool {

@@ -37,8 +37,8 @@ impl BilinearDensity {
         }
         // What lies below the horizon at a corner may be above it beside the corner: no density falls far below the
         // largest.
-        const LEAST_SHARE: f32 = 0.1;
-        Self { corners: (given / most).max(Vec4::splat(LEAST_SHARE)) }
+        const MIN_SHARE: f32 = 0.1;
+        Self { corners: (given / most).max(Vec4::splat(MIN_SHARE)) }
     }
 
     /// Shares of the edges, for uniform numbers in [0, 1).

@@ -16,7 +16,7 @@ pub(super) struct DistantLights {
 
 /// A light that looks smaller than this comes from one direction: f32 has too few directions within it, so that sampled
 /// ones fall outside (2 % of a disc of 6e-7 rad, 0.1 % of one of 9e-6).
-const SMALLEST_DISC_RAD: f32 = 5e-5;
+const MIN_DISC_RAD: f32 = 5e-5;
 
 #[derive(Clone, Debug)]
 struct DistantLight {
@@ -46,7 +46,7 @@ impl DistantLights {
             let one_minus_cos = 2.0 * half_sin * half_sin;
             // Irradiance of a disc of radiance L that is faced: π L sin²θ.
             let disc = PI * one_minus_cos * (2.0 - one_minus_cos);
-            let has_disc = angular_radius > SMALLEST_DISC_RAD;
+            let has_disc = angular_radius > MIN_DISC_RAD;
             distant.push(DistantLight {
                 cone: Cone { axis: -direction, one_minus_cos },
                 strength: if has_disc { irradiance / disc } else { irradiance },

@@ -25,7 +25,7 @@ pub(super) struct FlatEmitter {
     center: Vec3,
     /// Square of the distance of the centre beyond which it looks smaller than [`LEAST`].
     speck_beyond_squared: f32,
-    /// Likewise smaller than [`MOST_BILINEAR`].
+    /// Likewise smaller than [`MAX_BILINEAR`].
     bilinear_beyond_squared: f32,
     /// Unit normal of the front.
     pub(super) normal: Vec3,
@@ -40,7 +40,7 @@ pub(super) struct FlatEmitter {
 }
 
 /// Bound of the solid angle in steradian below which a parallelogram is sampled by its corners.
-const MOST_BILINEAR: f32 = 1.0;
+const MAX_BILINEAR: f32 = 1.0;
 
 /// Corners that lie this near to each other, as a share of the triangle's size, are one; edges whose cosine is
 /// below it are at a right angle.
@@ -112,7 +112,7 @@ impl FlatEmitter {
             edge_2,
             center: corners[0] + (edge_1 + edge_2) / 3.0,
             speck_beyond_squared: squared_distance_at(LEAST as f32, area, radius),
-            bilinear_beyond_squared: squared_distance_at(MOST_BILINEAR, area, radius),
+            bilinear_beyond_squared: squared_distance_at(MAX_BILINEAR, area, radius),
             normal: match winding {
                 Winding::CounterClockwise => normal,
                 Winding::Clockwise => -normal,
@@ -156,7 +156,7 @@ impl FlatEmitter {
             edge_2,
             center,
             speck_beyond_squared: squared_distance_at(LEAST as f32, area, radius),
-            bilinear_beyond_squared: squared_distance_at(MOST_BILINEAR, area, radius),
+            bilinear_beyond_squared: squared_distance_at(MAX_BILINEAR, area, radius),
             area,
             offset: self.offset.max(next.offset),
             even_radiance,

@@ -119,7 +119,7 @@ impl Kind {
 
 /// What is left to a kind of light of the share that it has among equals, however weak it seems; a little less,
 /// since all shares add up to 1.
-const LEAST_SHARE: f32 = 0.3;
+const MIN_SHARE: f32 = 0.3;
 
 /// Probabilities of the kinds.
 #[derive(Clone, Copy, Debug, Default)]
@@ -141,7 +141,7 @@ impl LightKindProbabilities {
             return self;
         }
         let shares: [f32; Kind::ALL.len()] =
-            std::array::from_fn(|kind| (strengths[kind] / total).max(LEAST_SHARE * self.0[kind]));
+            std::array::from_fn(|kind| (strengths[kind] / total).max(MIN_SHARE * self.0[kind]));
         let sum: f32 = shares.iter().sum();
         Self(shares.map(|share| share / sum))
     }

@@ -119,9 +119,9 @@ pub fn folder_of(file: &Path) -> &Path {
 /// Where links lead from a path at whose end nothing is.
 fn end_of_links(path: &Path) -> std::io::Result<PathBuf> {
     /// As many as Linux follows.
-    const MOST_LINKS: usize = 40;
+    const MAX_LINKS: usize = 40;
     let mut end = path.to_owned();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         let Ok(next) = end.read_link() else { return Ok(end) };
         end = end.parent().unwrap_or(Path::new("")).join(next);
     }

@@ -16,7 +16,7 @@ const NEARLY_WHITE: f32 = 0.98;
 /// Halvings of the interval in which the least such grey is looked for, in stops: from 64 to 1e-5.
 const HALVINGS: u32 = 23;
 /// Least light, of the display's white, that is a gain.
-const LEAST_GAIN: f32 = 1e-5;
+const MIN_GAIN: f32 = 1e-5;
 /// Around the pixel nearest to a soft edge that is covered whole its lamp is looked for so many pixels far: our
 /// widest filter, of radius 2, mixes what is up to 4 apart, so that between a lamp and what stands beside it the
 /// nearest may be of either.
@@ -116,7 +116,7 @@ fn beyond(
         (i, std::array::from_fn(|c| (alpha[i] * covering[i][c] + in_front(c)).min(1.0)))
     };
     let is_gain = |(i, light): &(usize, [f32; 3])| {
-        light.iter().zip(straight[*i]).any(|(light, straight)| light - alpha[*i] * straight > LEAST_GAIN)
+        light.iter().zip(straight[*i]).any(|(light, straight)| light - alpha[*i] * straight > MIN_GAIN)
     };
     pixels.into_iter().map(light).filter(is_gain).collect()
 }

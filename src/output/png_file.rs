@@ -3,7 +3,7 @@
 use super::png_read::SQUARE_WITHIN;
 use super::srgb_codes::SrgbCodes;
 use super::{OutputError, beside::write_beside, check_size};
-use fechner_perception::PIXELS_A_TASK;
+use fechner_perception::PIXELS_PER_TASK;
 use fechner_perception::display::{Display, Eotf};
 use fechner_perception::primaries::{IDENTITY, Primaries, apply};
 use rayon::prelude::*;
@@ -108,7 +108,7 @@ fn tag_as_srgb<W: Write>(encoder: &mut png::Encoder<'_, W>) {
 fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
     let wide = Primaries::REC709.to(&Primaries::REC2020).unwrap_or(IDENTITY);
     let mut bytes = vec![0; rgb_linear_display.len() * 6];
-    bytes.par_chunks_mut(6).zip(rgb_linear_display).with_min_len(PIXELS_A_TASK).for_each(|(bytes, rgb)| {
+    bytes.par_chunks_mut(6).zip(rgb_linear_display).with_min_len(PIXELS_PER_TASK).for_each(|(bytes, rgb)| {
         let shown = apply(&wide, rgb.map(|c| if c.is_nan() { 0.0 } else { f64::from(c) }));
         for (bytes, relative) in bytes.chunks_exact_mut(2).zip(shown) {
             let code = Eotf::pq_code(display.emitted_cd_m2(relative));

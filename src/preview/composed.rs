@@ -4,7 +4,7 @@
 use super::coarse::stand_in;
 use super::spectator::Stage;
 use crate::film::Film;
-use crate::integrator::PILOT_SAMPLES_A_HALF;
+use crate::integrator::PILOT_SAMPLES_PER_HALF;
 use crate::sampler::Half;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ impl Composed {
     pub(super) fn of_film(film: &Film, nits_per_unit: f64, stage: Stage) -> Self {
         // While a pixel's pilot is traced one half is ahead of the other, and their samples count alike.
         let is_in_pilot =
-            |pixel: usize| Half::BOTH.iter().all(|&half| film.half(half)[pixel].taken <= PILOT_SAMPLES_A_HALF);
+            |pixel: usize| Half::BOTH.iter().all(|&half| film.half(half)[pixel].taken <= PILOT_SAMPLES_PER_HALF);
         let light = |pixel: usize| {
             let light = match stage {
                 Stage::UnderWay if is_in_pilot(pixel) => Film::mean_of_samples_cd_m2,

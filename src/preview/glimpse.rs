@@ -13,7 +13,7 @@ const FRAME: Duration = Duration::from_millis(60);
 /// Pixels of the first glimpse, before anything was measured.
 const FIRST_PIXELS: f64 = 4096.0;
 /// Fewer say nothing.
-const FEWEST_PIXELS: f64 = 512.0;
+const MIN_PIXELS: f64 = 512.0;
 /// How far off the wished number of pixels may be before the resolution changes: one that jumps is worse than either.
 const TOLERANCE: f64 = 1.5;
 
@@ -70,7 +70,7 @@ impl Resolution {
     /// A glimpse of so many pixels took so long: the next may have at most four times as many.
     pub(super) fn took(&mut self, pixels: u32, time: Duration) {
         let affordable = f64::from(pixels) * FRAME.as_secs_f64() / time.as_secs_f64().max(1e-4);
-        self.pixels = affordable.clamp(FEWEST_PIXELS, 4.0 * self.pixels);
+        self.pixels = affordable.clamp(MIN_PIXELS, 4.0 * self.pixels);
     }
 }
 

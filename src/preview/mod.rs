@@ -50,7 +50,7 @@ use std::sync::Arc;
 
 /// Most pixels a side of a picture that is shown: a JPEG has 16 bits for them, and Chromium's canvas ends
 /// there, other browsers' earlier.
-pub const MOST_SIDE_PIXELS: u32 = u16::MAX as u32;
+pub const MAX_SIDE_PIXELS: u32 = u16::MAX as u32;
 
 /// A loaded scene and how to render it.
 pub struct Job {

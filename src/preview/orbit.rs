@@ -63,7 +63,7 @@ const FIELDS_OF_VIEW_DEG: [f32; 2] = [1.0, 150.0];
 /// The same for parallel rays, in heights of what the scene's own camera sees.
 const TIMES_HOME_HEIGHT: [f32; 2] = [1e-3, 1e3];
 /// Steps that one movement may take.
-const MOST_STEPS: f32 = 20.0;
+const MAX_STEPS: f32 = 20.0;
 
 /// A camera and the distance of the point about which it turns.
 #[derive(Clone, Debug)]
@@ -234,7 +234,7 @@ fn bounded(height: f32, home: Projection) -> f32 {
 
 /// What so many steps multiply by; 1 for steps that are no number.
 fn power(base: f32, steps: f32) -> f32 {
-    base.powf(if steps.is_nan() { 0.0 } else { steps.clamp(-MOST_STEPS, MOST_STEPS) })
+    base.powf(if steps.is_nan() { 0.0 } else { steps.clamp(-MAX_STEPS, MAX_STEPS) })
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::Sleep;
 
 /// Connections that are nobody's yet; more wait in the system's queue, where they cost no file.
-const MOST_STRANGERS: usize = 16;
+const MAX_STRANGERS: usize = 16;
 /// Time that a connection may take to ask for something and become a viewer's.
 const PATIENCE: Duration = Duration::from_secs(10);
 
@@ -32,7 +32,7 @@ pub(super) struct Porch {
 
 impl Porch {
     pub(super) fn before(listener: TcpListener) -> Self {
-        Self { listener, places: Arc::new(Semaphore::new(MOST_STRANGERS)), patience: PATIENCE }
+        Self { listener, places: Arc::new(Semaphore::new(MAX_STRANGERS)), patience: PATIENCE }
     }
 }
 
@@ -133,13 +133,13 @@ mod tests {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = listener.local_addr().expect("an address");
         let mut silent: Vec<std::net::TcpStream> =
-            (0..=MOST_STRANGERS).map(|_| std::net::TcpStream::connect(address).expect("connected")).collect();
+            (0..=MAX_STRANGERS).map(|_| std::net::TcpStream::connect(address).expect("connected")).collect();
         runtime.block_on(async {
             listener.set_nonblocking(true).expect("set");
             let mut porch = Porch::before(TcpListener::from_std(listener).expect("a listener"));
             porch.patience = Duration::from_millis(1);
             let mut there = Vec::new();
-            for _ in 0..MOST_STRANGERS {
+            for _ in 0..MAX_STRANGERS {
                 there.push(porch.accept().await.0);
             }
             let one_more = porch.accept();
@@ -152,7 +152,7 @@ mod tests {
             drop(first);
             there.push(porch.accept().await.0);
             there.iter().for_each(|guarded| guarded.stranger.let_in());
-            assert_eq!(porch.places.available_permits(), MOST_STRANGERS, "viewers take no place");
+            assert_eq!(porch.places.available_permits(), MAX_STRANGERS, "viewers take no place");
         });
         let ended = silent.remove(0).read(&mut [0]);
         assert!(ended.map_or(true, |bytes| bytes == 0), "the connection ended");

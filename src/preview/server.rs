@@ -17,9 +17,9 @@ use tokio::sync::Semaphore;
 /// The page, whole: it asks for nothing else.
 const PAGE: &str = include_str!("page.html");
 /// Commands are small.
-const LARGEST_MESSAGE_BYTES: usize = 1 << 14;
+const MAX_MESSAGE_BYTES: usize = 1 << 14;
 /// Viewers at a time; more are refused.
-const MOST_VIEWERS: u32 = 64;
+const MAX_VIEWERS: u32 = 64;
 /// Time that viewers may take for the last frame when the preview closes.
 const FAREWELL: Duration = Duration::from_secs(1);
 
@@ -60,7 +60,7 @@ pub fn random_token() -> Result<String, getrandom::Error> {
 pub(super) fn serve(listener: TcpListener, door: Door, shared: Arc<Shared>) -> std::io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
     let mut closing = shared.until_closing();
-    let seats = Arc::new(Semaphore::new(MOST_VIEWERS as usize));
+    let seats = Arc::new(Semaphore::new(MAX_VIEWERS as usize));
     let house = House { door: Arc::new(door), shared, seats: Arc::clone(&seats) };
     let served = runtime.block_on(async {
         listener.set_nonblocking(true)?;
@@ -72,7 +72,7 @@ pub(super) fn serve(listener: TcpListener, door: Door, shared: Arc<Shared>) -> s
             _ = closing.wait_for(|&closing| closing) => {}
         }
         // All seats are free when everybody has left; who reads nothing is not waited for.
-        let _ = tokio::time::timeout(FAREWELL, seats.acquire_many(MOST_VIEWERS)).await;
+        let _ = tokio::time::timeout(FAREWELL, seats.acquire_many(MAX_VIEWERS)).await;
         Ok(())
     });
     runtime.shutdown_background();
@@ -138,7 +138,7 @@ async fn socket(
         return (StatusCode::SERVICE_UNAVAILABLE, "503: there are too many viewers\n").into_response();
     };
     let shared = house.shared;
-    upgrade.max_message_size(LARGEST_MESSAGE_BYTES).on_upgrade(move |socket| async move {
+    upgrade.max_message_size(MAX_MESSAGE_BYTES).on_upgrade(move |socket| async move {
         stranger.let_in();
         attend(socket, shared).await;
         drop(seat);

@@ -245,7 +245,7 @@ impl<'a> Session<'a> {
                 }
             }
             // Who says so throws the picture away.
-            Err(JudgeError::Outdated) => self.state = RenderState::new(width, height, &self.settings.limits),
+            Err(JudgeError::Cancelled) => self.state = RenderState::new(width, height, &self.settings.limits),
             Err(error) => {
                 self.problems.meet(Cause::Look, error.to_string());
                 self.state = RenderState::new(width, height, &self.settings.limits);
@@ -278,5 +278,5 @@ impl<'a> Session<'a> {
 /// These settings, with looks that end when somebody wants another picture.
 fn interruptible(settings: LoopSettings, shared: &Arc<Shared>) -> LoopSettings {
     let shared = Arc::clone(shared);
-    LoopSettings { is_outdated: Some(Box::new(move || shared.is_outdated())), ..settings }
+    LoopSettings { is_cancelled: Some(Box::new(move || shared.is_cancelled())), ..settings }
 }

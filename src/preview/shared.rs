@@ -13,7 +13,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 
 /// Commands that may wait; more are dropped, as only a broken page sends them.
-const MOST_COMMANDS: usize = 1024;
+const MAX_COMMANDS: usize = 1024;
 
 /// A frame as viewers are sent it; without bytes before the first.
 #[derive(Default)]
@@ -27,7 +27,7 @@ pub(super) struct Shared {
     commands: Mutex<VecDeque<Command>>,
     arrived: Condvar,
     /// Whether a command that waits throws the picture away.
-    is_outdated: AtomicBool,
+    is_cancelled: AtomicBool,
     /// Viewers of each layer.
     viewers: [AtomicUsize; Layer::ALL.len()],
     frames: [watch::Sender<Encoded>; Layer::ALL.len()],
@@ -48,7 +48,7 @@ impl Shared {
         Self {
             commands: Mutex::default(),
             arrived: Condvar::new(),
-            is_outdated: AtomicBool::new(false),
+            is_cancelled: AtomicBool::new(false),
             viewers: std::array::from_fn(|_| AtomicUsize::new(0)),
             frames: std::array::from_fn(|_| watch::Sender::default()),
             numbered: AtomicU64::new(0),
@@ -65,8 +65,8 @@ impl Shared {
         let mut commands = self.commands.lock().unpoisoned();
         if let Some(earlier) = commands.back_mut().filter(|earlier| command.replaces(earlier)) {
             *earlier = command;
-        } else if commands.len() < MOST_COMMANDS {
-            self.is_outdated.fetch_or(command.throws_the_picture_away(), Ordering::SeqCst);
+        } else if commands.len() < MAX_COMMANDS {
+            self.is_cancelled.fetch_or(command.throws_the_picture_away(), Ordering::SeqCst);
             commands.push_back(command);
         }
         self.arrived.notify_all();
@@ -80,13 +80,13 @@ impl Shared {
     /// Takes all commands that have come.
     pub(super) fn take_commands(&self) -> VecDeque<Command> {
         let mut commands = self.commands.lock().unpoisoned();
-        self.is_outdated.store(false, Ordering::SeqCst);
+        self.is_cancelled.store(false, Ordering::SeqCst);
         std::mem::take(&mut *commands)
     }
 
     /// Whether work on the picture is of no use any more.
-    pub(super) fn is_outdated(&self) -> bool {
-        self.is_closing() || self.is_outdated.load(Ordering::SeqCst)
+    pub(super) fn is_cancelled(&self) -> bool {
+        self.is_closing() || self.is_cancelled.load(Ordering::SeqCst)
     }
 
     /// Waits until a command comes, the preview closes or the time is up.

@@ -138,7 +138,7 @@ pub struct Sample {
 }
 
 /// log₂ of the side of the squares of pixels that share a sequence in Z-order: 14 bits of an index, 18 for the samples.
-const MOST_TILE_BITS: u32 = 7;
+const MAX_TILE_BITS: u32 = 7;
 
 impl BlockKey {
     /// Names the samples, at most 16, of what is asked before a render. `stream`: a seed of its own, so that they
@@ -171,7 +171,7 @@ impl BlockKey {
     /// log₂ of the side of the squares of pixels that share this block's sequence: smaller where its samples leave less
     /// room in an index, or pixels 64 apart would share the samples of a block of 2¹⁹.
     fn tile_bits(self) -> u32 {
-        MOST_TILE_BITS.min((u32::BITS - u32::from(self.log2_samples)) / 2)
+        MAX_TILE_BITS.min((u32::BITS - u32::from(self.log2_samples)) / 2)
     }
 
     /// The sample with this index in the block.

@@ -51,7 +51,7 @@ pub struct TextureId(pub u32);
 /// variances in (cd/m²)² vanish or are infinite, and nothing can be said of noise.
 pub const NITS_PER_UNIT: RangeInclusive<f64> = 1e-6..=1e9;
 /// Stops that exposure may be corrected by at most, up or down.
-pub const MOST_EXPOSURE_STOPS: f64 = 100.0;
+pub const MAX_EXPOSURE_STOPS: f64 = 100.0;
 
 /// What is rendered, in memory: geometry, materials, lights and camera.
 #[derive(Clone, Debug)]

@@ -131,7 +131,7 @@ pub enum Surface {
 
 impl Surface {
     /// Most components that nested mixes of one material may have together.
-    pub const MOST_COMPONENTS: usize = 8;
+    pub const MAX_COMPONENTS: usize = 8;
 
     /// A clear, smooth dielectric boundary.
     pub const fn clear_dielectric(ior: f32) -> Self {

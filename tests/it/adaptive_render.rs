@@ -163,8 +163,8 @@ fn looks_that_are_broken_off_change_nothing() {
     let questions = Arc::new(AtomicU32::new(0));
     let asked = Arc::clone(&questions);
     // Apart by numbers that no look's questions are a multiple of.
-    let is_outdated = move || [2, 5, 11, 18, 29, 37, 48].contains(&asked.fetch_add(1, Ordering::SeqCst));
-    let disturbed = LoopSettings { is_outdated: Some(Box::new(is_outdated)), ..settings() };
+    let is_cancelled = move || [2, 5, 11, 18, 29, 37, 48].contains(&asked.fetch_add(1, Ordering::SeqCst));
+    let disturbed = LoopSettings { is_cancelled: Some(Box::new(is_cancelled)), ..settings() };
     let mut state = RenderState::new(208, 208, &disturbed.limits);
     let mut breaks = 0;
     let last_look = loop {
@@ -386,7 +386,7 @@ fn every_look_is_in_the_seconds() {
     for (sampling, monitor) in renders {
         let asked = Arc::new(AtomicU32::new(0));
         let mut settings = loop_settings(scene.nits_per_unit, sampling, None, Some(24));
-        settings.is_outdated = Some(Box::new({
+        settings.is_cancelled = Some(Box::new({
             let asked = Arc::clone(&asked);
             move || {
                 std::thread::sleep(ASLEEP);

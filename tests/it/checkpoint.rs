@@ -2,7 +2,7 @@
 
 use crate::support::command::repository_scene;
 use crate::support::{load_cornell_box, loop_settings, trace_settings};
-use fechner::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings, RivalRule, Sampling};
+use fechner::adaptive::settings::{DENOISED_PILOT_SAMPLES_PER_PIXEL, Limits, LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReason, render, resume, run};
 use fechner::checkpoint::{
@@ -124,7 +124,7 @@ fn a_denoised_render_that_is_continued_equals_one_in_one_go() {
     let to = |visibility: f64| {
         let mut settings = loop_settings(nits_per_unit, Sampling::Adaptive, visibility, None);
         settings.denoiser = Some(Denoiser::open(DenoiserKind::Builtin).expect("built in"));
-        settings.limits.pilot_samples = DENOISED_PILOT_SAMPLES_A_PIXEL;
+        settings.limits.pilot_samples = DENOISED_PILOT_SAMPLES_PER_PIXEL;
         settings.limits.mean_samples = Some(150);
         settings
     };

@@ -3,7 +3,7 @@
 use crate::support::command::{self, cornell_box, fechner};
 use crate::support::{loop_settings, trace_settings};
 use fechner::adaptive::audit::{Audit, audit, audit_unproven};
-use fechner::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{DENOISED_PILOT_SAMPLES_PER_PIXEL, Limits, LoopSettings, Sampling};
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{Quiet, Rendered, render as render_scene, resume, run};
 use fechner::denoise::{Denoiser, NoisyPicture, Oidn, SurfaceGuides};
@@ -125,7 +125,7 @@ fn a_denoised_render_may_leave_off_between_looks() {
     let scene = Arc::new(load(&path, &LoadOptions::default()).expect("loads"));
     let settings = |plans: Option<u32>| {
         let settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 2.0, Some(40));
-        let limits = Limits { plans, pilot_samples: DENOISED_PILOT_SAMPLES_A_PIXEL, ..settings.limits };
+        let limits = Limits { plans, pilot_samples: DENOISED_PILOT_SAMPLES_PER_PIXEL, ..settings.limits };
         LoopSettings { denoiser: Some(Denoiser::Builtin), limits, ..settings }
     };
     let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(48, 48, 1));

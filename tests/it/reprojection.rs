@@ -12,7 +12,7 @@ use std::sync::Arc;
 const WIDTH: u32 = 60;
 const HEIGHT: u32 = 40;
 const ROWS: u32 = 6;
-const PATCHES_A_ROW: u32 = 17;
+const PATCHES_PER_ROW: u32 = 17;
 
 /// A wall of patches of as many greys. Its rows slide past each other, and the camera goes by and turns. Nothing is in the way
 /// of the light of the surroundings, so that no patch changes as it moves.
@@ -24,8 +24,8 @@ fn wall(frame: f32) -> Scene {
     scene.camera = Camera::pinhole(eye, Vec3::new(0.01 * frame, 0.0, -1.0).normalize(), Vec3::Y, 40.0);
     for row in 0..ROWS {
         let slid = 0.18 * (row as f32 - 2.5) * frame;
-        for patch in 0..PATCHES_A_ROW {
-            let grey = 0.1 + 0.8 * (0.618_034 * (row * PATCHES_A_ROW + patch) as f32).fract();
+        for patch in 0..PATCHES_PER_ROW {
+            let grey = 0.1 + 0.8 * (0.618_034 * (row * PATCHES_PER_ROW + patch) as f32).fract();
             let material = add_material(&mut scene, diffuse(grey), Vec3::ZERO);
             let corner = Vec3::new(0.9 * (patch as f32 - 8.5) + slid, 0.6 * (row as f32 - 3.0), 0.0);
             add_rectangle(&mut scene, corner, Vec3::X * 0.9, Vec3::Y * 0.6, material);

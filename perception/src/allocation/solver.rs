@@ -10,20 +10,20 @@ use crate::plane::Plane;
 use crate::threshold::POOLING_SIGMA_DEG;
 
 /// Updates after which the multipliers are taken as they are; on a small grid, where they cost nothing, ten times more.
-const MOST_ITERATIONS: usize = 100;
+const MAX_ITERATIONS: usize = 100;
 /// Multipliers of a small grid.
 const SMALL_GRID: usize = 4096;
 /// Gap at which to stop on any but a small grid, where updates are dear, whatever was asked for.
-const LEAST_GAP_OF_LARGE_GRIDS: f64 = 5e-3;
+const MIN_GAP_OF_LARGE_GRIDS: f64 = 5e-3;
 /// How often the gap is looked at.
 const CHECK_EVERY: usize = 5;
 /// Rounds that raise counts to what constraints need after the last update.
-const MOST_REPAIRS: usize = 12;
+const MAX_REPAIRS: usize = 12;
 /// Slack given to constraints that cannot be met.
 const UNREACHABLE_SLACK: f32 = 1.01;
 
 /// Above every v² that counts within their limits can leave: weights are at most 1e18, samples at least 1e-6.
-const LARGEST_BOUND: f64 = 1e25;
+const MAX_BOUND: f64 = 1e25;
 
 /// One problem, prepared.
 pub(super) struct Solver<'a> {
@@ -117,7 +117,7 @@ impl<'a> Solver<'a> {
         let tolerance = self.problem.tolerance.map(Plane::values);
         for (index, bound) in bounds.values_mut().iter_mut().enumerate() {
             let tolerated = tolerance.map_or(1.0, |tolerance| f64::from(tolerance[index]));
-            let wanted = (target * tolerated * tolerated).min(LARGEST_BOUND) as f32;
+            let wanted = (target * tolerated * tolerated).min(MAX_BOUND) as f32;
             // Rounding alone must not call a constraint unreachable.
             if *bound > wanted * 1.000_01 {
                 unreachable += 1;
@@ -165,9 +165,9 @@ impl<'a> Solver<'a> {
         let mut best_bound = f64::NEG_INFINITY;
         let mut best_multipliers = multipliers.to_vec();
         let (most_iterations, enough_gap) = if multipliers.len() <= SMALL_GRID {
-            (10 * MOST_ITERATIONS, self.problem.enough_gap)
+            (10 * MAX_ITERATIONS, self.problem.enough_gap)
         } else {
-            (MOST_ITERATIONS, self.problem.enough_gap.max(LEAST_GAP_OF_LARGE_GRIDS))
+            (MAX_ITERATIONS, self.problem.enough_gap.max(MIN_GAP_OF_LARGE_GRIDS))
         };
         for iteration in 1..=most_iterations {
             iterations = iteration;
@@ -230,12 +230,12 @@ impl<'a> Solver<'a> {
         Allocation { samples, cost, lower_bound, gap, visibility: 0.0, unreachable_pixels: 0, iterations }
     }
 
-    /// Raises counts around violated constraints until none is left, for at most [`MOST_REPAIRS`] rounds.
+    /// Raises counts around violated constraints until none is left, for at most [`MAX_REPAIRS`] rounds.
     fn repair(&self, samples: &mut Plane, bounds: &Plane) {
         let most = self.problem.max_samples as f32;
         let least = self.problem.min_samples as f32;
         let reach = self.sigma_px.map(|sigma| (2.0 * sigma).ceil() as usize);
-        for _ in 0..MOST_REPAIRS {
+        for _ in 0..MAX_REPAIRS {
             let excess = self.excess(samples, bounds);
             let worst = excess.max();
             if worst <= 1.0 {

@@ -48,13 +48,13 @@ impl ContrastSensitivity for Barten99 {
 fn sensitivity_of(freq_cpd: f64, field_deg: f64, sigma_deg: f64, trolands: f64, photon_conversion: f64) -> f64 {
     const SIGNAL_TO_NOISE: f64 = 3.0;
     const INTEGRATION_S: f64 = 0.1;
-    const LARGEST_FIELD_DEG: f64 = 12.0;
-    const MOST_CYCLES: f64 = 15.0;
+    const MAX_FIELD_DEG: f64 = 12.0;
+    const MAX_CYCLES: f64 = 15.0;
     const QUANTUM_EFFICIENCY: f64 = 0.03;
     const NEURAL_NOISE: f64 = 3e-8;
     const INHIBITION_CPD: f64 = 7.0;
     let optics = (-2.0 * (std::f64::consts::PI * sigma_deg * freq_cpd).powi(2)).exp();
-    let window = field_deg.powi(-2) + LARGEST_FIELD_DEG.powi(-2) + (freq_cpd / MOST_CYCLES).powi(2);
+    let window = field_deg.powi(-2) + MAX_FIELD_DEG.powi(-2) + (freq_cpd / MAX_CYCLES).powi(2);
     let photon_noise = (QUANTUM_EFFICIENCY * photon_conversion * trolands).recip();
     let neural_noise = NEURAL_NOISE / -(-(freq_cpd / INHIBITION_CPD).powi(2)).exp_m1();
     optics / SIGNAL_TO_NOISE / (2.0 / INTEGRATION_S * window * (photon_noise + neural_noise)).sqrt()

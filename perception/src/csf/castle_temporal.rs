@@ -78,19 +78,19 @@ impl Energies {
 }
 
 /// Levels a decade at which what changes with luminance in time is tabulated.
-const LEVELS_A_DECADE: usize = 4;
+const LEVELS_PER_DECADE: usize = 4;
 /// Levels over castleCSF's domain.
-const LEVELS: usize = (DOMAIN_DECADES[1] - DOMAIN_DECADES[0]) as usize * LEVELS_A_DECADE + 1;
+const LEVELS: usize = (DOMAIN_DECADES[1] - DOMAIN_DECADES[0]) as usize * LEVELS_PER_DECADE + 1;
 
 /// Luminances of the levels, cd/m².
 pub(super) fn levels_cd_m2() -> impl Iterator<Item = f64> {
-    (0..LEVELS).map(|level| 10.0_f64.powf(f64::from(DOMAIN_DECADES[0]) + level as f64 / LEVELS_A_DECADE as f64))
+    (0..LEVELS).map(|level| 10.0_f64.powf(f64::from(DOMAIN_DECADES[0]) + level as f64 / LEVELS_PER_DECADE as f64))
 }
 
 /// Between which levels a luminance stands.
 pub(super) fn between_levels(luminance_cd_m2: f64) -> Between {
     let decades = luminance_cd_m2.max(1e-12).log10() - f64::from(DOMAIN_DECADES[0]);
-    Between::of(decades * LEVELS_A_DECADE as f64, LEVELS)
+    Between::of(decades * LEVELS_PER_DECADE as f64, LEVELS)
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ const REACH_S: f64 = 0.2;
 /// Looks at a display in a second, at the least: a step of light is seen most some 20 ms before and after it, and
 /// flicker of 12 Hz at its peak. Measured on flicker of ±3 % at 12 Hz: one look in the middle of each of 24 frames
 /// finds 0.80 of its contrast over threshold.
-const LOOKS_A_SECOND: f64 = 120.0;
+const LOOKS_PER_SECOND: f64 = 120.0;
 
 /// Weights of frames around the one that is shown, from [`FrameResponses::reach`] frames earlier to as many later.
 pub(crate) type Weights = Vec<f32>;
@@ -80,7 +80,7 @@ impl Look {
 impl FrameResponses {
     pub(crate) fn new(timing: FrameTiming) -> Result<Self, Error> {
         timing.check()?;
-        let count = (LOOKS_A_SECOND / timing.frames_per_second).ceil() as usize;
+        let count = (LOOKS_PER_SECOND / timing.frames_per_second).ceil() as usize;
         let frame_s = 1.0 / timing.frames_per_second;
         let moment_s = |look: usize| ((look as f64 + 0.5) / count as f64 - 0.5) * frame_s;
         let looks: Vec<Look> = (0..count).map(|look| Moment::new(timing, moment_s(look)).look()).collect();

@@ -27,7 +27,7 @@ pub(crate) struct PursuedNoise {
 }
 
 /// Steps for each lobe of the noise's spectrum, which is 1 / (T p) wide.
-const STEPS_A_LOBE: usize = 8;
+const STEPS_PER_LOBE: usize = 8;
 /// Beyond so many lobes what is left counts as constant, which is more than there is.
 const LOBES: usize = 16;
 const ANGLES: usize = 16;
@@ -38,7 +38,7 @@ impl PursuedNoise {
     pub(crate) fn new(area_deg2: f64, timing: FrameTiming, luminance_cd_m2: f64) -> Result<Self, Error> {
         timing.check()?;
         let held_s = timing.persistence / timing.frames_per_second;
-        let step_hz = 1.0 / (held_s * STEPS_A_LOBE as f64);
+        let step_hz = 1.0 / (held_s * STEPS_PER_LOBE as f64);
         let bins = (HIGHEST_HZ / HZ_STEP) as usize;
         let responses: Vec<(f64, [f64; 2])> = (0..bins)
             .map(|bin| (bin as f64 + 0.5) * HZ_STEP)
@@ -54,7 +54,7 @@ impl PursuedNoise {
             }
             energies
         };
-        let by_shift = (0..=LOBES * STEPS_A_LOBE).map(|step| at_shift(step as f64 * step_hz)).collect();
+        let by_shift = (0..=LOBES * STEPS_PER_LOBE).map(|step| at_shift(step as f64 * step_hz)).collect();
         Ok(Self { csf: CastleCsf::new(area_deg2)?, luminance_cd_m2, by_shift, step_hz })
     }
 

@@ -7,7 +7,7 @@ use crate::plane::Plane;
 use crate::threshold::ThresholdMap;
 
 /// The least share that is worth the transforms.
-const LEAST_SHARE: f32 = 0.01;
+const MIN_SHARE: f32 = 0.01;
 
 /// The share of the raw mean that leaves the least squared error, if the two errors are independent: that of the denoised
 /// picture over both, as far as its bias is proven and greater than the raw noise.
@@ -57,7 +57,7 @@ impl BandError {
 /// what is seen beside it. What is shown ends at the display's range, to which the residual is held.
 #[must_use]
 pub fn step_towards_raw(map: &ThresholdMap, error: &DenoisedError, residual: &Plane) -> Option<Plane> {
-    let is_worth_it = |share: &Plane| share.values().iter().any(|&share| share > LEAST_SHARE);
+    let is_worth_it = |share: &Plane| share.values().iter().any(|&share| share > MIN_SHARE);
     if !residual.same_size(&map.adaptation_cd_m2) || !error.raw_shares.iter().any(is_worth_it) {
         return None;
     }

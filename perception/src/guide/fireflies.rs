@@ -6,7 +6,7 @@ use crate::rows::Rows;
 use std::ops::Range;
 
 /// Fewer neighbours say nothing of a pixel.
-const LEAST_NEIGHBORS: f32 = 3.0;
+const MIN_NEIGHBORS: f32 = 3.0;
 
 /// Brings pixels down to four standard deviations above the mean of those of their kind in the 5×5 pixels around, themselves
 /// left out.
@@ -71,7 +71,7 @@ impl Neighbors {
     fn limit(&self, x: usize) -> Option<f32> {
         let (count, mean) = (self.counts[x], self.sums[x] / self.counts[x]);
         let variance = (self.squares[x] / count - mean * mean).max(0.0);
-        (count >= LEAST_NEIGHBORS).then(|| mean + 4.0 * variance.sqrt())
+        (count >= MIN_NEIGHBORS).then(|| mean + 4.0 * variance.sqrt())
     }
 }
 

@@ -43,7 +43,7 @@ pub struct GuideInputs<'a> {
 const PASSES: u32 = 5;
 const _: () = assert!(1 << (PASSES - 1) <= BORDER, "the widest hole reads beyond the border of a row");
 /// Albedos below this, by luminance, are not divided out.
-const LEAST_ALBEDO: f32 = 0.02;
+const MIN_ALBEDO: f32 = 0.02;
 // Channels of a row of illumination: light that falls on the surface, its luminance and that luminance's variance.
 const LIGHT_CHANNELS: usize = 5;
 const RED: usize = 0;
@@ -96,12 +96,12 @@ pub fn denoise(inputs: &GuideInputs<'_>) -> Vec<[f32; 3]> {
 /// luminance, or not finite.
 #[must_use]
 pub fn divisor(albedo: [f32; 3]) -> [f32; 3] {
-    if is_divided(albedo) { albedo.map(|channel| channel.max(LEAST_ALBEDO)) } else { [1.0; 3] }
+    if is_divided(albedo) { albedo.map(|channel| channel.max(MIN_ALBEDO)) } else { [1.0; 3] }
 }
 
 /// Whether a pixel's light is divided by its albedo: what is not is in another unit, and no neighbour of what is.
 fn is_divided(albedo: [f32; 3]) -> bool {
-    albedo.iter().all(|channel| channel.is_finite()) && luminance(albedo) > LEAST_ALBEDO
+    albedo.iter().all(|channel| channel.is_finite()) && luminance(albedo) > MIN_ALBEDO
 }
 
 /// Light that falls on each pixel's surface.

@@ -183,19 +183,19 @@ struct PerLuminance(UniformTable);
 impl PerLuminance {
     const LOWEST_DECADE: f32 = -4.0;
     const DECADES: f32 = 12.0;
-    const ENTRIES_A_DECADE: f32 = 16.0;
+    const ENTRIES_PER_DECADE: f32 = 16.0;
 
     /// `value_at(luminance in cd/m²)` must be positive.
     fn new(value_at: impl Fn(f64) -> f64) -> Self {
-        let last = (Self::DECADES * Self::ENTRIES_A_DECADE) as usize;
+        let last = (Self::DECADES * Self::ENTRIES_PER_DECADE) as usize;
         Self(UniformTable::new((0..=last).map(|index| {
-            let decade = Self::LOWEST_DECADE + index as f32 / Self::ENTRIES_A_DECADE;
+            let decade = Self::LOWEST_DECADE + index as f32 / Self::ENTRIES_PER_DECADE;
             value_at(10.0_f64.powf(f64::from(decade))).max(1e-30).ln() as f32
         })))
     }
 
     fn at(&self, luminance_cd_m2: f32) -> f32 {
-        self.0.at((luminance_cd_m2.max(1e-4).log10() - Self::LOWEST_DECADE) * Self::ENTRIES_A_DECADE).exp()
+        self.0.at((luminance_cd_m2.max(1e-4).log10() - Self::LOWEST_DECADE) * Self::ENTRIES_PER_DECADE).exp()
     }
 }
 

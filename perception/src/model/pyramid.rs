@@ -13,9 +13,9 @@ use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 pub(crate) const BANDS: usize = 6;
 /// Contrast of all bands together below which there is none: what the kernel's rounding leaves of a uniform picture is 20 times less,
 /// the least that eyes see 100 times more.
-const LEAST_CONTRAST: f32 = 1e-5;
+const MIN_CONTRAST: f32 = 1e-5;
 /// Below this luminance, cd/m², a band's contrast is taken over it instead.
-const LEAST_LUMINANCE_CD_M2: f32 = 1e-4;
+const MIN_LUMINANCE_CD_M2: f32 = 1e-4;
 
 /// Local band contrasts `C_i` = |`G_i` − `G_i+1`| / `G_i+2` (Lubin, Peli) of Gaussian levels `G_0` = picture, `G_i+1` = `G_i` through
 /// the kernel (0.05, 0.25, 0.4, 0.25, 0.05) with holes of 2^i pixels.
@@ -32,7 +32,7 @@ pub(crate) fn band_contrasts(picture: &Plane) -> Vec<Plane> {
             let mut contrast = levels[0].clone();
             contrast.for_each_row_mut(|y, row| {
                 for (value, (next, base)) in row.iter_mut().zip(levels[1].row(y).iter().zip(levels[2].row(y))) {
-                    *value = (*value - next).abs() / base.max(LEAST_LUMINANCE_CD_M2);
+                    *value = (*value - next).abs() / base.max(MIN_LUMINANCE_CD_M2);
                 }
             });
             contrast
@@ -72,7 +72,7 @@ pub(crate) fn contrast_weighted(
                 elevation += contrast * elevation_at(x, y, adaptation, band, contrast);
                 total += contrast;
             }
-            *value = thresholds.at(adaptation) * if total > LEAST_CONTRAST { factor(elevation / total) } else { 1.0 };
+            *value = thresholds.at(adaptation) * if total > MIN_CONTRAST { factor(elevation / total) } else { 1.0 };
         }
     });
     allowed

@@ -71,15 +71,15 @@ fn eye_step(motion: &FrameMotion, pixel: usize, towards: Towards, display: &Disp
 const LONGEST_SMEAR_S: f64 = 1.0 / 24.0;
 /// Places that half a smear is summed over: for each pixel of its length, beside as many as tell which part of a short one lies within
 /// the pixel itself.
-const TAPS_A_PIXEL: f32 = 2.0;
-const LEAST_TAPS: f32 = 6.0;
-const MOST_TAPS: f32 = 64.0;
+const TAPS_PER_PIXEL: f32 = 2.0;
+const MIN_TAPS: f32 = 6.0;
+const MAX_TAPS: f32 = 64.0;
 /// Pixels from a pixel's centre to its border.
 const WITHIN_PIXEL: f32 = 0.5;
 
 /// Places that half a smear of `length` pixels is summed over.
 fn taps(length: f32) -> f32 {
-    if length <= WITHIN_PIXEL { 1.0 } else { (LEAST_TAPS + TAPS_A_PIXEL * length).min(MOST_TAPS).ceil() }
+    if length <= WITHIN_PIXEL { 1.0 } else { (MIN_TAPS + TAPS_PER_PIXEL * length).min(MAX_TAPS).ceil() }
 }
 
 /// The way of each pixel's retinal place over a frame, from where it is when the frame is half through its time, pixels.

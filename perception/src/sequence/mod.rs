@@ -30,7 +30,7 @@ use rayon::prelude::*;
 /// Looks that are taken together, for which pictures are held in memory.
 const LOOKS_AT_ONCE: usize = 5;
 /// Of so many looks one is at colours, which are seen to flicker half as fast: it saves a quarter of the time.
-const LOOKS_A_COLOUR: usize = 2;
+const LOOKS_PER_COLOUR: usize = 2;
 /// Frames with fewer looks than this are looked at for colours in all of them, as which of them is the right one depends on where the
 /// light changes.
 const FEW_LOOKS: usize = 5;
@@ -346,7 +346,7 @@ impl<'a> Filters<'a> {
 /// Whether a look, of so many a frame, is at colours: the outermost ones are, and the others in turn from them to the middle, so that a
 /// frame before a change and one after it are seen alike.
 fn is_at_colours(look: usize, count: usize) -> bool {
-    count < FEW_LOOKS || look.min(count - 1 - look).is_multiple_of(LOOKS_A_COLOUR)
+    count < FEW_LOOKS || look.min(count - 1 - look).is_multiple_of(LOOKS_PER_COLOUR)
 }
 
 fn raise(greatest: &mut Plane, other: &Plane) {

@@ -42,8 +42,8 @@ const OUTSET_INVERSE: Matrix = [
     [0.111_420_988_957_48, 0.087_199_619_202_834_9, 0.801_379_391_839_686],
 ];
 const MIDDLE_GREY: f64 = 0.18;
-const LEAST_STOPS: f64 = -10.0;
-const MOST_STOPS: f64 = 6.5;
+const MIN_STOPS: f64 = -10.0;
+const MAX_STOPS: f64 = 6.5;
 const SLOPE: f64 = 2.4;
 const POWER: f64 = 1.5;
 const GAMMA: f64 = 2.4;
@@ -60,7 +60,7 @@ struct Sigmoid {
 
 impl Sigmoid {
     fn new() -> Self {
-        let pivot_x = -LEAST_STOPS / (MOST_STOPS - LEAST_STOPS);
+        let pivot_x = -MIN_STOPS / (MAX_STOPS - MIN_STOPS);
         let pivot_y = MIDDLE_GREY.powf(GAMMA.recip());
         // The scale with which the curve's end reaches 0 or 1.
         let scale =
@@ -117,8 +117,8 @@ impl FittedAgx {
 
 /// Display light of a channel.
 fn channel(light: f64) -> f64 {
-    let stops = (light.max(1e-10) / MIDDLE_GREY).log2().clamp(LEAST_STOPS, MOST_STOPS);
-    let place = (stops - LEAST_STOPS) / (MOST_STOPS - LEAST_STOPS) * STEPS as f64;
+    let stops = (light.max(1e-10) / MIDDLE_GREY).log2().clamp(MIN_STOPS, MAX_STOPS);
+    let place = (stops - MIN_STOPS) / (MAX_STOPS - MIN_STOPS) * STEPS as f64;
     let step = (place as usize).min(STEPS - 1);
     let [from, to] = [CURVE[step], CURVE[step + 1]];
     from + (place - step as f64) * (to - from)
@@ -209,7 +209,7 @@ mod tests {
         let slope = (sigmoid.at(x + step) - sigmoid.at(x - step)) / (2.0 * step);
         assert!((slope / SLOPE - 1.0).abs() < 1e-3, "{slope}");
         let furthest = (0..=100_000).map(|part| f64::from(part) / 1e5).fold(0.0, |furthest: f64, x| {
-            let light = MIDDLE_GREY * (LEAST_STOPS + x * (MOST_STOPS - LEAST_STOPS)).exp2();
+            let light = MIDDLE_GREY * (MIN_STOPS + x * (MAX_STOPS - MIN_STOPS)).exp2();
             furthest.max((channel(light) - sigmoid.at(x).clamp(0.0, 1.0).powf(GAMMA)).abs())
         });
         assert!(furthest < 3e-7, "{furthest}");

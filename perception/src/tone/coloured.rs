@@ -4,7 +4,7 @@ use super::acuity::AcuityFilter;
 use super::gamut::hue;
 use super::{FittedTone, Pixel, SavedTone};
 use crate::photometry::luminance;
-use crate::plane::PIXELS_A_TASK;
+use crate::plane::PIXELS_PER_TASK;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub fn coloured(fitted: Box<dyn FittedTone>, width: usize, rgb: &[[f32; 3]]) -> 
     if fitted.keeps_luminance() {
         return fitted;
     }
-    let hues = rgb.par_iter().with_min_len(PIXELS_A_TASK).map(|&rgb| hue(rgb).unwrap_or_default()).collect();
+    let hues = rgb.par_iter().with_min_len(PIXELS_PER_TASK).map(|&rgb| hue(rgb).unwrap_or_default()).collect();
     Box::new(Coloured { fitted: fitted.into(), width, hues })
 }
 

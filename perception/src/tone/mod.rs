@@ -130,7 +130,7 @@ pub trait ToneOperator: Send + Sync + Debug {
 }
 
 /// Darkest grey whose colours are asked for: below it ratios of channels are rounding.
-const LEAST_GREY_CD_M2: f32 = 1e-6;
+const MIN_GREY_CD_M2: f32 = 1e-6;
 
 /// A tone operator with every parameter decided.
 ///
@@ -176,7 +176,7 @@ pub trait FittedTone: Send + Sync + Debug {
     ///
     /// Unless the operator says otherwise it keeps the ratios of a colour's channels.
     fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
-        let luminance = scene_cd_m2.max(LEAST_GREY_CD_M2);
+        let luminance = scene_cd_m2.max(MIN_GREY_CD_M2);
         self.relative_luminance_at(pixel, luminance).min(1.0) / luminance
     }
 

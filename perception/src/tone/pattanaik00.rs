@@ -15,7 +15,7 @@ use super::saved::{Fit, SavedTone};
 use super::screen::Screen;
 use super::time::{AdaptationState, Goal, Kinetics, ReceptorState};
 use super::words::Shown;
-use super::{FittedTone, LEAST_GREY_CD_M2, ToneOperator};
+use super::{FittedTone, MIN_GREY_CD_M2, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::{luminance, scotopic_luminance};
 
@@ -43,11 +43,11 @@ static LOWERED: LazyLock<FixedPower> = LazyLock::new(|| FixedPower::new(POWER.re
 const WHITE_FACTOR: f64 = 5.0;
 const BLACK_FACTOR: f64 = 5.0 / 32.0;
 /// The half-saturation formulas are 0 / 0 at 0 cd/m².
-const LEAST_ADAPTATION_CD_M2: f64 = 1e-6;
+const MIN_ADAPTATION_CD_M2: f64 = 1e-6;
 
 /// Half-saturation luminance of cones, cd/m² (Hunt's model, as the paper has it).
 fn sigma_cone(adaptation_cd_m2: f64) -> f64 {
-    let light = adaptation_cd_m2.max(LEAST_ADAPTATION_CD_M2);
+    let light = adaptation_cd_m2.max(MIN_ADAPTATION_CD_M2);
     let k4 = (5.0 * light + 1.0).recip().powi(4);
     12.9223 * light / (k4 * light + 0.171 * (1.0 - k4).powi(2) * light.cbrt())
 }
@@ -55,7 +55,7 @@ fn sigma_cone(adaptation_cd_m2: f64) -> f64 {
 /// Half-saturation luminance of rods, cd/m². 2.5874 as published, though Hunt's formula scaled as for cones would give
 /// 12.92; j with 5e5, where `pfstmo_pattanaik00` has 5e4, which differ below 0.001 cd/m².
 fn sigma_rod(adaptation_cd_m2: f64) -> f64 {
-    let light = adaptation_cd_m2.max(LEAST_ADAPTATION_CD_M2);
+    let light = adaptation_cd_m2.max(MIN_ADAPTATION_CD_M2);
     let j2 = (5e5 * light + 1.0).recip().powi(2);
     2.5874 * light / (19_000.0 * j2 * light + 0.2615 * (1.0 - j2).powi(4) * light.powf(1.0 / 6.0))
 }
@@ -287,7 +287,7 @@ impl FittedTone for FittedPattanaik00 {
     }
 
     fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
-        let light = scene_cd_m2.max(LEAST_GREY_CD_M2);
+        let light = scene_cd_m2.max(MIN_GREY_CD_M2);
         let retina = self.retina_at(pixel);
         let share = retina.cones.share(light);
         let (cones, rods) = (retina.cones.pigment * share, retina.rods.response(f64::from(light)));

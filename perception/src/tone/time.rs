@@ -178,8 +178,8 @@ impl AdaptationState {
 }
 
 /// Largest ratio by which (1 + G / half-bleach) may change within one step of the pigment.
-const LARGEST_STEP_RATIO: f64 = 1.005;
-const MOST_STEPS: f64 = 4096.0;
+const MAX_STEP_RATIO: f64 = 1.005;
+const MAX_STEPS: f64 = 4096.0;
 
 /// Luminance that changes evenly for a while.
 #[derive(Clone, Copy)]
@@ -206,7 +206,7 @@ impl Ramp {
     /// its mean within each piece: the rods' rate, (1 + G / 0.04) / 400 s, is far too fast for Euler steps of a frame.
     fn pigment(self, start: f64, kinetics: &ReceptorKinetics) -> f64 {
         let (first, last) = (kinetics.half_bleach_cd_m2 + self.from, kinetics.half_bleach_cd_m2 + self.to);
-        let steps = ((last / first).ln().abs() / LARGEST_STEP_RATIO.ln()).ceil().clamp(1.0, MOST_STEPS);
+        let steps = ((last / first).ln().abs() / MAX_STEP_RATIO.ln()).ceil().clamp(1.0, MAX_STEPS);
         let growth = (last / first).powf(steps.recip());
         let (mut pigment, mut low) = (start, first);
         for step in 0..steps as usize {

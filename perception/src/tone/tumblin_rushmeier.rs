@@ -31,7 +31,7 @@ pub struct TumblinRushmeier {
 /// One lambert in cd/m².
 const LAMBERT_CD_M2: f64 = 1e4 / std::f64::consts::PI;
 /// Below 1.6e-4 cd/m² the law's exponent turns negative and the picture into its negative.
-const LEAST_ADAPTATION_CD_M2: f64 = 1e-3;
+const MIN_ADAPTATION_CD_M2: f64 = 1e-3;
 
 impl ToneOperator for TumblinRushmeier {
     fn name(&self) -> &'static str {
@@ -75,7 +75,7 @@ struct BrightnessMatch {
 impl BrightnessMatch {
     fn between(scene_adaptation_cd_m2: f64, display_adaptation_cd_m2: f64) -> Self {
         let laws = |adaptation_cd_m2: f64| {
-            let log = (adaptation_cd_m2.max(LEAST_ADAPTATION_CD_M2) / LAMBERT_CD_M2).log10();
+            let log = (adaptation_cd_m2.max(MIN_ADAPTATION_CD_M2) / LAMBERT_CD_M2).log10();
             (0.4 * log + 2.92, -0.4 * log * log - 2.584 * log + 2.0208)
         };
         let (scene_slope, scene_offset) = laws(scene_adaptation_cd_m2);

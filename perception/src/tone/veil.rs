@@ -15,9 +15,9 @@ use crate::table::Between;
 /// Rushmeier and Piatko 1997).
 const SHARE: f64 = 0.08;
 /// Least range of the picture, in natural logarithms, from which a veil is worth making (`pcond`).
-const LEAST_RANGE: f64 = 4.5;
+const MIN_RANGE: f64 = 4.5;
 /// More cells than this would make the sum over all pairs slow; they then grow beyond 1°.
-const MOST_CELLS: usize = 2500;
+const MAX_CELLS: usize = 2500;
 
 /// A smooth veil of achromatic light over a picture, frozen.
 ///
@@ -47,11 +47,11 @@ struct CellCount {
 }
 
 impl CellCount {
-    /// As many as it takes for cells of at most one degree, or of as many as keep a picture below [`MOST_CELLS`].
+    /// As many as it takes for cells of at most one degree, or of as many as keep a picture below [`MAX_CELLS`].
     fn of(width: usize, height: usize, density: PixelDensity) -> Self {
         let pixels = |pixels_per_degree: f64| (pixels_per_degree.round() as usize).max(1);
         let (mut width_px, mut height_px) = (pixels(density.horizontal), pixels(density.vertical));
-        while width.div_ceil(width_px) * height.div_ceil(height_px) > MOST_CELLS {
+        while width.div_ceil(width_px) * height.div_ceil(height_px) > MAX_CELLS {
             (width_px, height_px) = (2 * width_px, 2 * height_px);
         }
         Self { columns: width.div_ceil(width_px), rows: height.div_ceil(height_px) }
@@ -72,7 +72,7 @@ impl Veil {
             foveal.values().iter().fold((f64::INFINITY, 0.0), |(least, greatest): (f64, f64), &value| {
                 (least.min(f64::from(value).max(1e-4)), greatest.max(f64::from(value)))
             });
-        if foveal.values().len() < 2 || (greatest / least).ln() < LEAST_RANGE {
+        if foveal.values().len() < 2 || (greatest / least).ln() < MIN_RANGE {
             return None;
         }
         let cell_rad = CellAngle {

@@ -14,7 +14,7 @@ use super::screen::{Screen, finite};
 use super::statistics::filled;
 use super::time::{AdaptationState, Goal};
 use super::veil::Veil;
-use super::{FittedTone, LEAST_GREY_CD_M2, ToneOperator};
+use super::{FittedTone, MIN_GREY_CD_M2, ToneOperator};
 use crate::adaptation::{Mean, local_adaptation_cd_m2};
 use crate::display::Display;
 use crate::display::Viewing;
@@ -152,7 +152,7 @@ impl FittedTone for FittedWardLarson97 {
     }
 
     fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
-        let retinal = self.retinal(pixel, scene_cd_m2.max(LEAST_GREY_CD_M2));
+        let retinal = self.retinal(pixel, scene_cd_m2.max(MIN_GREY_CD_M2));
         let kept = if self.colour { kept_colour(retinal) } else { 1.0 };
         let own_share = if self.veil.is_some() { Veil::own_share() } else { 1.0 };
         own_share * kept * self.shown(retinal).min(1.0) / retinal

@@ -10,7 +10,7 @@
 //!
 //! In a shot both are by thresholds of noise that is new in every frame.
 
-use super::{Audit, Energy, FreshSamples, LEAST_TILES, STRATUM, Tile, choose_tiles, is_large_enough};
+use super::{Audit, Energy, FreshSamples, MIN_TILES, STRATUM, Tile, choose_tiles, is_large_enough};
 use crate::adaptive::judge::{JudgeError, Judgement};
 use crate::adaptive::settings::LoopSettings;
 use crate::film::{Film, HalfPixel, Halves};
@@ -29,7 +29,7 @@ const UNPROVEN_SHARE: f64 = 0.5;
 /// unproven, and for pictures of fewer than 150 tiles, of which six would cost too much.
 ///
 /// # Errors
-/// [`JudgeError::Outdated`] alone.
+/// [`JudgeError::Cancelled`] alone.
 pub fn audit_unproven(
     tracer: &PathTracer,
     film: &Film,
@@ -46,10 +46,10 @@ pub fn audit_unproven(
         tile.pixels(width).map(|pixel| f64::from(unproven.values()[pixel])).sum::<f64>() / (TILE * TILE) as f64
     };
     let candidates: Vec<Tile> = all.iter().copied().filter(|tile| share(tile) >= UNPROVEN_SHARE).collect();
-    if candidates.len() < LEAST_TILES || !is_large_enough(&all) {
+    if candidates.len() < MIN_TILES || !is_large_enough(&all) {
         return Ok(None);
     }
-    let tiles = choose_tiles(&candidates, (candidates.len() / STRATUM).max(LEAST_TILES), round);
+    let tiles = choose_tiles(&candidates, (candidates.len() / STRATUM).max(MIN_TILES), round);
     let pixels: Vec<usize> = tiles.iter().flat_map(|tile| tile.pixels(width)).collect();
     let fresh = FreshSamples::take(tracer, film, &pixels, TIMES, settings, round)?;
 

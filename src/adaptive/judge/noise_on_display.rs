@@ -1,13 +1,13 @@
 //! What the display makes of the noise of samples. What the eye sees of it is left to the thresholds.
 
 use super::super::settings::LoopSettings;
-use super::super::statistics::{DifferenceOnDisplay, MOST_FACTOR, by_channel};
+use super::super::statistics::{DifferenceOnDisplay, MAX_FACTOR, by_channel};
 use crate::film::{CHANNELS, Film, Halves, share_of_mean};
 use crate::sampler::Half;
 use fechner_perception::opponent::Opponent;
 use fechner_perception::seen::{self, NoiseShown, SceneColours};
 use fechner_perception::tone::{FittedTone, Pixel, SceneLight};
-use fechner_perception::{PIXELS_A_TASK, Plane};
+use fechner_perception::{PIXELS_PER_TASK, Plane};
 use rayon::prelude::*;
 
 /// Variance of a pixel's mean over that of one sample: [`share_of_mean`].
@@ -78,7 +78,7 @@ impl NoiseOnDisplay<'_> {
 
 /// Planes of what is found for each of so many pixels, by channel.
 fn planes_of(width: usize, pixels: usize, of: impl Fn(usize) -> [f32; CHANNELS] + Sync) -> [Plane; CHANNELS] {
-    let found: Vec<_> = (0..pixels).into_par_iter().with_min_len(PIXELS_A_TASK).map(&of).collect();
+    let found: Vec<_> = (0..pixels).into_par_iter().with_min_len(PIXELS_PER_TASK).map(&of).collect();
     by_channel(|c| Plane::from_fn(width, pixels / width.max(1), |x, y| found[y * width + x][c]))
 }
 
@@ -102,7 +102,7 @@ pub fn display_scale(
 /// Most times of what scatter says that halves may differ by, where the operator knows the picture's colours: how noise
 /// of single channels goes together no variances tell. Measured of a red wall two stops over by `pbr-neutral`, asked
 /// for 1: it ends at 1.56 with the others' most, at 1.47 with 2 and at 1.23 with this.
-const MOST_FACTOR_OF_COLOURS: f32 = 4.0;
+const MAX_FACTOR_OF_COLOURS: f32 = 4.0;
 
 /// What the halves differ by as displayed, by channel, and what independent samples about the guide's luminance would.
 /// `guide`: that, cd/m². `colours`: of the guide.
@@ -126,7 +126,7 @@ pub(super) fn difference_on_display(
         || squared_differences(film, guide.width(), tone, settings),
         || noise.of_displayed(guide, |pixel| film.halves(pixel).sample_variances(), |_, displayed| 0.5 * displayed),
     );
-    let most_factor = if tone.without_colours().is_none() { MOST_FACTOR } else { MOST_FACTOR_OF_COLOURS };
+    let most_factor = if tone.without_colours().is_none() { MAX_FACTOR } else { MAX_FACTOR_OF_COLOURS };
     DifferenceOnDisplay { squared, expected, most_factor }
 }
 

@@ -4,7 +4,7 @@ use super::super::missed::FoundLight;
 use super::super::settings::LoopSettings;
 use super::over_white::OverWhite;
 use super::steps::{Guide, MissedNoise, Scatter, Thresholds, chromatic_gains};
-use super::{JudgeError, Purpose, still_wanted};
+use super::{JudgeError, Purpose, check_cancelled};
 use crate::film::Film;
 use crate::sampler::Half;
 use fechner_perception::Plane;
@@ -55,7 +55,7 @@ impl PerSample {
     fn met(sources: &Sources<'_>, lights: Option<&[FoundLight; 2]>) -> Result<Self, JudgeError> {
         let &Sources { film, guide, scatter, tone, thresholds, settings, inflation } = sources;
         let gains = chromatic_gains(thresholds, settings)?;
-        still_wanted(settings)?;
+        check_cancelled(settings)?;
         let of_halves = lights.map(|lights| {
             let scales = scatter.scales_of_halves(film, guide, lights, tone, settings, inflation);
             scatter.per_sample_of_halves(film, scales.each_ref(), thresholds, gains.as_ref())

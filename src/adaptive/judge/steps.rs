@@ -7,7 +7,7 @@ use super::super::settings::LoopSettings;
 use super::super::small_things::unmet_noise;
 use super::super::statistics::{SampleStatistics, by_channel, scene_units};
 use super::noise_on_display::{NoiseOnDisplay, difference_on_display, variance_shares};
-use super::{JudgeError, guide_rgb, still_wanted};
+use super::{JudgeError, check_cancelled, guide_rgb};
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
@@ -265,7 +265,7 @@ pub(super) fn found_thresholds(
 ) -> Result<Thresholds, JudgeError> {
     let csf = contrast_sensitivity(settings.frames, tone, settings)?;
     let in_bands = in_pursuit(of_resting_eye(&csf, displayed_guide, noise, settings)?, guide, tone, settings)?;
-    still_wanted(settings)?;
+    check_cancelled(settings)?;
     let of_model = |model: &dyn ThresholdModel| {
         model.allowed_standard_error_cd_m2(&ModelInputs {
             display_luminance_cd_m2: displayed_guide,

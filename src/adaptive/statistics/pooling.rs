@@ -12,9 +12,9 @@ use std::slice::ChunksMut;
 /// Pixels to each side that are pooled.
 const POOL_RADIUS: usize = 3;
 /// Least low-discrepancy factor.
-const LEAST_FACTOR: f32 = 0.02;
+const MIN_FACTOR: f32 = 0.02;
 /// Evidence is cut here, so that sums and products of weights stay finite.
-const MOST_EVIDENCE: f64 = 1e36;
+const MAX_EVIDENCE: f64 = 1e36;
 
 /// A channel's statistics of every pixel.
 pub(super) struct Pooled {
@@ -106,9 +106,9 @@ const LOOKS: usize = 0;
 const LOOK_FACTS: usize = 7;
 const DEPTH_LOOK: usize = LOOK_FACTS - 1;
 /// What a neighbour weighs at the least.
-const LEAST_WEIGHT: usize = LOOKS + LOOK_FACTS;
+const MIN_WEIGHT: usize = LOOKS + LOOK_FACTS;
 /// The first of each channel's three; see [`PixelEvidence`].
-const EVIDENCE: usize = LEAST_WEIGHT + 1;
+const EVIDENCE: usize = MIN_WEIGHT + 1;
 const VARIANCE: usize = 0;
 const SQUARED_DIFFERENCE: usize = 1;
 const EXPECTED_DIFFERENCE: usize = 2;
@@ -201,10 +201,10 @@ impl Facts {
 
 fn facts_of(surface: &AsNeighbour, evidence: &[PixelEvidence; CHANNELS]) -> [f32; FACTS] {
     let mut facts = [0.0; FACTS];
-    facts[LOOKS..LEAST_WEIGHT].copy_from_slice(&surface.looks);
-    facts[LEAST_WEIGHT] = surface.least_weight;
+    facts[LOOKS..MIN_WEIGHT].copy_from_slice(&surface.looks);
+    facts[MIN_WEIGHT] = surface.least_weight;
     for (facts, pixel) in facts[EVIDENCE..].chunks_exact_mut(3).zip(evidence) {
-        let bounded = |value: f64| value.min(MOST_EVIDENCE) as f32;
+        let bounded = |value: f64| value.min(MAX_EVIDENCE) as f32;
         facts[VARIANCE] = bounded(pixel.variance);
         facts[SQUARED_DIFFERENCE] = bounded(pixel.squared_difference);
         facts[EXPECTED_DIFFERENCE] = bounded(pixel.expected_difference);
@@ -235,7 +235,7 @@ impl Surfaces {
             let apart = *own - fact(tile, LOOKS + look, at);
             unlike += apart * apart;
         }
-        unlike.recip().max(fact(tile, LEAST_WEIGHT, at))
+        unlike.recip().max(fact(tile, MIN_WEIGHT, at))
     }
 }
 
@@ -289,7 +289,7 @@ impl Sums {
         for ((sums, own), row) in self.channels.iter().zip(own).zip(rows) {
             // A pixel like none of its neighbours has only itself to go by.
             row.variance[column] = if weight > 0.0 { sums.variance[lane] / weight } else { own.variance as f32 };
-            row.factor[column] = sums.factor(lane).max(LEAST_FACTOR);
+            row.factor[column] = sums.factor(lane).max(MIN_FACTOR);
             row.factor_with_own[column] = match f64::from(sums.expected[lane]) + own.expected_difference {
                 0.0 => 1.0,
                 expected => ((f64::from(sums.squared[lane]) + own.squared_difference) / expected) as f32,

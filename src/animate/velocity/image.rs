@@ -137,9 +137,9 @@ impl Search<'_> {
 
     /// Gauss and Newton's method with a derivative by differences at every step; `None` where it does not come to rest.
     fn solve(&self, mut aim: Aim) -> Option<Vec2> {
-        const MOST_STEPS: usize = 12;
+        const MAX_STEPS: usize = 12;
         const AT_REST_PX: f32 = 0.005;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let step = self.step(aim)?;
             let next = self.shortened(aim, step)?;
             let moved = next.place_px.distance(aim.place_px);
@@ -174,10 +174,10 @@ impl Search<'_> {
 
     /// The step, or the part of it after which the target is missed by less.
     fn shortened(&self, aim: Aim, step: Vec2) -> Option<Aim> {
-        const MOST_HALVINGS: i32 = 5;
+        const MAX_HALVINGS: i32 = 5;
         // Where it is missed by rounding alone, no step makes it less.
         const ROUNDING: f32 = 1e-6;
-        (0..=MOST_HALVINGS).find_map(|halving| {
+        (0..=MAX_HALVINGS).find_map(|halving| {
             let next = self.aim(aim.place_px + step * 0.5_f32.powi(halving))?;
             (next.miss.length() <= aim.miss.length().max(ROUNDING)).then_some(next)
         })

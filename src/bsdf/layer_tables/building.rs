@@ -1,7 +1,7 @@
 //! How the tables of a coat over a metal are made: a lobe of one reflection, scaled until it brings out what the walk
 //! does.
 
-use super::{COLUMNS, Cell, LayerPoint, SMALLEST_AVERAGE, cosine, inside, outside, place, seen_through};
+use super::{COLUMNS, Cell, LayerPoint, MIN_AVERAGE, cosine, inside, outside, place, seen_through};
 use crate::bsdf::albedo_table::{TablePlace, direction_at, visible_normals_and_weights};
 use crate::bsdf::anisotropic_table::{AZIMUTHS, Azimuths};
 use crate::bsdf::coat::Coat;
@@ -116,7 +116,7 @@ impl<'a> CoatOver<'a> {
             for (column, point) in points.iter_mut().enumerate() {
                 let wanted = leaving.first(&self.entering[column]);
                 let gone = leaving_by_lobe(&lobe[column], &last, last[column].brought_out);
-                point.brought_out = (point.brought_out * wanted / gone.max(SMALLEST_AVERAGE)).clamp(0.0, 1.0);
+                point.brought_out = (point.brought_out * wanted / gone.max(MIN_AVERAGE)).clamp(0.0, 1.0);
             }
         }
         let last = points;

@@ -6,7 +6,7 @@ use fechner_perception::display::Eotf;
 use std::path::Path;
 
 /// Most frames on a sheet; of longer shots as many, evenly spread, with the first and the last.
-const MOST_FRAMES: usize = 48;
+const MAX_FRAMES: usize = 48;
 /// About how wide a sheet is, pixels.
 const SHEET_WIDTH: usize = 1600;
 /// Pixels between frames.
@@ -14,7 +14,7 @@ const GAP: usize = 4;
 
 /// Numbers, from 0, of the frames that stand on the sheet of a shot of `count`.
 pub(super) fn on_sheet(count: usize) -> impl Iterator<Item = usize> {
-    let shown = count.min(MOST_FRAMES);
+    let shown = count.min(MAX_FRAMES);
     (0..shown).map(move |place| if shown > 1 { place * (count - 1) / (shown - 1) } else { 0 })
 }
 
@@ -90,7 +90,7 @@ mod tests {
     fn long_shots_are_spread() {
         assert_eq!(on_sheet(3).collect::<Vec<_>>(), [0, 1, 2]);
         let spread: Vec<usize> = on_sheet(1000).collect();
-        assert!(spread.len() == MOST_FRAMES && spread[0] == 0 && spread[MOST_FRAMES - 1] == 999);
+        assert!(spread.len() == MAX_FRAMES && spread[0] == 0 && spread[MAX_FRAMES - 1] == 999);
         assert_eq!(on_sheet(1).collect::<Vec<_>>(), [0]);
     }
 

@@ -3,7 +3,7 @@
 use crate::cli::numbers::parse_positive;
 
 /// Most frames of a shot: eleven hours and a half at 24 a second.
-const MOST_FRAMES: u32 = 1_000_000;
+const MAX_FRAMES: u32 = 1_000_000;
 
 /// A range of frames, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub(super) struct Frames {
 impl Frames {
     /// Whether they are few enough.
     pub(super) fn is_a_shot(self) -> bool {
-        self.last - self.first < MOST_FRAMES
+        self.last - self.first < MAX_FRAMES
     }
 }
 
@@ -32,7 +32,7 @@ pub(super) fn parse_frames(text: &str) -> Result<Frames, String> {
         return Err(format!("\"{text}\" ends before it begins; expected FIRST..LAST such as 0..47"));
     }
     if !frames.is_a_shot() {
-        return Err(format!("\"{text}\": at most {MOST_FRAMES} frames, both ends included"));
+        return Err(format!("\"{text}\": at most {MAX_FRAMES} frames, both ends included"));
     }
     Ok(frames)
 }

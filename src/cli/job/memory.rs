@@ -12,10 +12,10 @@ pub(in crate::cli) fn check_memory(size: Size) -> anyhow::Result<()> {
     const BYTES_PER_PIXEL: u64 = 700;
     let Size { width, height } = size;
     let pixels = u64::from(width) * u64::from(height);
-    if pixels > u64::from(Film::MOST_PIXELS) {
+    if pixels > u64::from(Film::MAX_PIXELS) {
         bail!(
             "a picture of {width}x{height} has more than the {} pixels that a film may have: choose a smaller --size",
-            Film::MOST_PIXELS
+            Film::MAX_PIXELS
         );
     }
     let needed = pixels * BYTES_PER_PIXEL;

@@ -3,7 +3,7 @@
 use super::{Report, TOO_FEW, patch_count};
 use crate::cli::console::duration_in_words;
 use crate::cli::words::{OF_THE_MODEL, count, rounded};
-use fechner::adaptive::audit::MOST_INFLATION;
+use fechner::adaptive::audit::MAX_INFLATION;
 use fechner::adaptive::settings::{LoopSettings, Sampling};
 use fechner::adaptive::{Rendered, StopReason};
 use fechner_perception::Plane;
@@ -124,7 +124,7 @@ fn importance(report: &Report) -> Option<String> {
 const NOTABLE_ENERGY_CHANGE: f64 = 0.005;
 
 /// Less of the picture is 0.0 % in words.
-const LEAST_TOLD_SHARE: f64 = 0.0005;
+const MIN_TOLD_SHARE: f64 = 0.0005;
 
 fn denoised(report: &Report) -> Vec<String> {
     let Some(denoised) = &report.denoised else { return Vec::new() };
@@ -141,7 +141,7 @@ fn denoised(report: &Report) -> Vec<String> {
         ),
         _ => format!("{by}."),
     };
-    let unproven = denoised.unproven_fraction.filter(|&share| share >= LEAST_TOLD_SHARE).map(|share| {
+    let unproven = denoised.unproven_fraction.filter(|&share| share >= MIN_TOLD_SHARE).map(|share| {
         format!(
             "Unproven: in {:.1} % of the picture, which is called fine, raw noise is too strong to show that the \
              denoiser changed nothing visible; there its error is inferred from the rest of the picture.",
@@ -166,7 +166,7 @@ fn audited(report: &Report, rendered: &Rendered) -> Option<String> {
         return Some(format!("Audit: nothing is predicted to show in {}.", count(audit.tiles, tile)));
     }
     let times = rendered.inflation;
-    let since = if times >= MOST_INFLATION {
+    let since = if times >= MAX_INFLATION {
         format!("; {times:.1} times as much is predicted since, the most that is believed: it may still be too little")
     } else if audit.disagrees() {
         format!("; {times:.1} times as much is predicted since")

@@ -17,7 +17,7 @@ const _: () = assert!(TILE.is_multiple_of(LANES), "a tile's rows are whole group
 /// written once for all of these.
 const AT_ONCE: usize = 4;
 /// Neighbours of less weight are passed over.
-const LEAST_WEIGHT: f32 = 1e-4;
+const MIN_WEIGHT: f32 = 1e-4;
 /// Variance of a sample's feature, about: what a fit follows may be the features' own noise, which is this over the
 /// samples.
 const FEATURE_VARIANCE: f64 = 0.004;
@@ -95,7 +95,7 @@ impl Neighbours<'_> {
     fn weight(&self, tap: usize) -> Option<Lanes> {
         let mut weight = Lanes::ZERO;
         weight.0.copy_from_slice(&self.weights[tap][self.row][self.column..self.column + LANES]);
-        if weight.any_is_at_least(LEAST_WEIGHT) { Some(weight) } else { None }
+        if weight.any_is_at_least(MIN_WEIGHT) { Some(weight) } else { None }
     }
 }
 

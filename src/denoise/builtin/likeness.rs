@@ -117,17 +117,17 @@ pub(super) type TileWeights = [[f32; TILE]; TILE];
 #[derive(Default)]
 pub(super) struct Scratch {
     /// Unlikeness of each pixel of the tile and around it.
-    unlike: [[f32; WIDEST]; TILE + 2 * MOST_PATCH],
-    along: [[f32; TILE]; TILE + 2 * MOST_PATCH],
+    unlike: [[f32; WIDEST]; TILE + 2 * MAX_PATCH],
+    along: [[f32; TILE]; TILE + 2 * MAX_PATCH],
 }
 
 /// The most pixels to each side that are compared.
-const MOST_PATCH: usize = 2;
+const MAX_PATCH: usize = 2;
 /// Widest row of a tile's neighbourhoods: as wide as they are and more, in whole vectors.
 pub(super) const WIDEST: usize = TILE + 8;
 
 impl<const PATCH: usize> Likeness<'_, PATCH> {
-    const FITS: () = assert!(PATCH <= MOST_PATCH, "a patch is wider than there is room for");
+    const FITS: () = assert!(PATCH <= MAX_PATCH, "a patch is wider than there is room for");
 
     /// Weights of a tap for the pixels of the tile whose first pixel this is. Inlined, as all that it calls, for wide
     /// vectors.

@@ -7,7 +7,7 @@ use super::library::Size;
 use std::borrow::Cow;
 
 /// Pixels of a side from which on it has no frame.
-const LEAST_SIDE: usize = 16;
+const MIN_SIDE: usize = 16;
 
 /// Pixels that a shorter side is brought to: 24, since by 16 light is still up to 3.6 % off, and 32 are no better
 /// (`benches/results/denoising.md`).
@@ -24,7 +24,7 @@ impl Frame {
     /// The frame around a picture: none to be seen where that is large enough, or has no pixels.
     pub(super) fn around(picture: Size) -> Self {
         let Size { width, height } = picture;
-        let framed_side = |side: usize| if side < LEAST_SIDE { FRAMED_SIDE } else { side };
+        let framed_side = |side: usize| if side < MIN_SIDE { FRAMED_SIDE } else { side };
         let framed = match width.min(height) {
             0 => picture,
             _ => Size { width: framed_side(width), height: framed_side(height) },
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn what_is_large_enough_has_no_frame() {
-        let size = Size { width: LEAST_SIDE, height: 100 };
+        let size = Size { width: MIN_SIDE, height: 100 };
         assert!(matches!(Frame::around(size).put_around(&numbered(size)), Cow::Borrowed(_)));
     }
 }

@@ -69,7 +69,7 @@ fn place_instances(scene: &Scene, uses: &[u32], items: &mut BoundedItems) -> Sha
     let is_placed = |instance: &&Instance| uses[instance.mesh.0 as usize] >= 2 && instance.motion.is_none();
     let vertices = |instance: &Instance| scene.meshes[instance.mesh.0 as usize].positions.len();
     let all_vertices = scene.instances.iter().filter(is_placed).map(vertices).sum::<usize>();
-    let around = if all_vertices <= MOST_VERTICES { Around::Vertices } else { Around::OwnBox };
+    let around = if all_vertices <= MAX_VERTICES { Around::Vertices } else { Around::OwnBox };
     let mut trees: Vec<MeshTree> = Vec::new();
     let mut of_mesh = vec![None; scene.meshes.len()];
     for (number, instance) in scene.instances.iter().enumerate() {
@@ -163,7 +163,7 @@ fn fixed_triangles(scene: &Scene, uses: &[u32]) -> Vec<([Vec3A; 3], TriangleRef)
 
 /// Vertices of all placed instances up to which boxes are made around each; of more, around the corners of the meshes'
 /// boxes.
-const MOST_VERTICES: usize = 30_000_000;
+const MAX_VERTICES: usize = 30_000_000;
 
 /// What a box is made around.
 #[derive(Clone, Copy, Debug)]

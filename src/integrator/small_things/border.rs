@@ -4,7 +4,7 @@
 //! light half a pixel beyond, six renders in eight find nothing and stop at 16 samples, 77 times above threshold. Only
 //! lamps and the sky are looked for, that cameras see straight; what they are compared with may be lit.
 
-use super::luminances::{LEAST_CONTRAST, Luminances};
+use super::luminances::{Luminances, MIN_CONTRAST};
 use super::shares::{Piece, Shares};
 use crate::integrator::{Crop, PathTracer};
 use crate::sampler::{BlockKey, Pixel, Purpose};
@@ -64,7 +64,7 @@ impl PathTracer {
         let straight =
             |place_px: Vec2| self.luminance_of(self.light_straight_along(ray_of(place_px, 0), key.sample(0)));
         let [there, inside] = [straight(*place_px), straight(*inside_px)];
-        if (there - inside).abs() <= LEAST_CONTRAST * inside {
+        if (there - inside).abs() <= MIN_CONTRAST * inside {
             return 0.0;
         }
         // What has no light of its own may be as bright.

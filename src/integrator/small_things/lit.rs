@@ -18,9 +18,9 @@ use std::f32::consts::TAU;
 
 /// Triangles and spheres that are looked at, of objects with the fewest triangles first; the rest is left to chance.
 /// Each takes 3 µs: some of what the first samples of a pixel take.
-const FACETS_A_PIXEL: f32 = 0.25;
-const FEWEST_FACETS: usize = 1 << 12;
-const MOST_FACETS: usize = 1 << 16;
+const FACETS_PER_PIXEL: f32 = 0.25;
+const MIN_FACETS: usize = 1 << 12;
+const MAX_FACETS: usize = 1 << 16;
 /// Places around a spot that are looked at.
 const AROUND: u32 = 8;
 /// As far from it, over what is small there.
@@ -30,7 +30,7 @@ const MOST_ALIKE: usize = 2;
 /// Paths that ask how bright a spot is. Each place around it has one.
 const PATHS: u32 = 4;
 /// Such paths over the film's pixels, at most: a thirtieth of what their first samples take.
-const PATHS_A_PIXEL: f32 = 0.5;
+const PATHS_PER_PIXEL: f32 = 0.5;
 /// Makes the random numbers differ from those of pictures, whatever their seed.
 const STREAM: u64 = 0x6c69_745f_7370_6f74;
 
@@ -42,7 +42,7 @@ pub(super) struct BrightSpot {
 
 /// How many triangles and spheres are looked at for a film of so many pixels, at all moments together.
 pub(super) fn most_facets(pixels: usize) -> usize {
-    ((FACETS_A_PIXEL * pixels as f32) as usize).clamp(FEWEST_FACETS, MOST_FACETS)
+    ((FACETS_PER_PIXEL * pixels as f32) as usize).clamp(MIN_FACETS, MAX_FACETS)
 }
 
 /// Pieces of objects that do not shine evenly, in one order at any time, of those with the fewest first. `is_asked`:
@@ -101,7 +101,7 @@ impl PathTracer {
     /// The spots that lamps have, and those of other things that are unlike all that is around them.
     pub(super) fn bright_spots(&self, camera: &CameraAt<'_>, spots: Vec<Spot>, moment: &Moment) -> Vec<BrightSpot> {
         let alone: Vec<Spot> = spots.into_par_iter().filter(|spot| self.is_alone(camera, spot)).collect();
-        let affordable = (PATHS_A_PIXEL * self.settings.film_area().pixels() as f32) as usize / moment.of;
+        let affordable = (PATHS_PER_PIXEL * self.settings.film_area().pixels() as f32) as usize / moment.of;
         let alike = (alone.len() * (PATHS + AROUND) as usize).div_ceil(affordable.max(1)).max(1);
         let asked = asked_for(&alone, alike);
         let luminance_of = |number: usize| self.luminance_at(camera, &alone[number], number, moment);

@@ -2,9 +2,9 @@
 
 /// What is less, over the darker surroundings, is left to chance: of a sixteenth of a pixel sixteen samples would
 /// scatter by 2 %.
-pub(super) const LEAST_CONTRAST: f32 = 0.3;
+pub(super) const MIN_CONTRAST: f32 = 0.3;
 /// So is what is fewer standard errors of these paths.
-const LEAST_ERRORS: f32 = 2.0;
+const MIN_ERRORS: f32 = 2.0;
 
 /// Luminances that paths found.
 #[derive(Default)]
@@ -29,7 +29,7 @@ impl Luminances {
     pub(super) fn difference(&self, surroundings: &Self) -> f32 {
         let difference = (self.mean() - surroundings.mean()).abs();
         let error = (self.variance_of_mean() + surroundings.variance_of_mean()).sqrt();
-        let is_seen = difference >= LEAST_CONTRAST * surroundings.mean() && difference >= LEAST_ERRORS * error;
+        let is_seen = difference >= MIN_CONTRAST * surroundings.mean() && difference >= MIN_ERRORS * error;
         if is_seen { difference } else { 0.0 }
     }
 

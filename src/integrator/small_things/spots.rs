@@ -17,7 +17,7 @@ const THICK_PX: f32 = 1.5;
 /// and pixel filters no wider.
 const BORDER_PX: f32 = 3.5;
 /// What is blurred no wider than this, in pixels, is seen as from the middle of the lens.
-const LEAST_BLUR_PX: f32 = 0.25;
+const MIN_BLUR_PX: f32 = 0.25;
 /// Each point of the lens sees a spot at a place of its own; between these, its light is spread as far as this, over
 /// the blur.
 const SPREAD: f32 = 0.25;
@@ -45,7 +45,7 @@ pub(super) struct Spot {
 impl Spot {
     /// Whether points of the lens see it at different places.
     pub(super) fn is_blurred(&self) -> bool {
-        self.blur_px.max_element() > LEAST_BLUR_PX
+        self.blur_px.max_element() > MIN_BLUR_PX
     }
 }
 

@@ -9,7 +9,7 @@ use fechner_perception::eccentricity::{GAZE_MARGIN_DEG, Gaze};
 use std::time::{Duration, Instant};
 
 /// Between two places that are followed.
-const LEAST_INTERVAL: Duration = Duration::from_millis(700);
+const MIN_INTERVAL: Duration = Duration::from_millis(700);
 
 /// Where thresholds are of, and how far one may look from there.
 pub(super) struct Follower {
@@ -30,7 +30,7 @@ impl Follower {
             (Some(a), Some(b)) => degrees_apart(a, b, self.density) >= GAZE_MARGIN_DEG,
             _ => true,
         };
-        is_elsewhere && self.since.is_none_or(|since| since.elapsed() >= LEAST_INTERVAL)
+        is_elsewhere && self.since.is_none_or(|since| since.elapsed() >= MIN_INTERVAL)
     }
 
     /// The gaze from here on.

@@ -2,7 +2,7 @@
 
 use crate::adaptive::settings::{Limits, LoopSettings};
 use crate::preview::Job;
-use crate::scene::MOST_EXPOSURE_STOPS;
+use crate::scene::MAX_EXPOSURE_STOPS;
 use fechner_perception::display::{Display, Observer, Viewing};
 use fechner_perception::eccentricity::Gaze;
 use fechner_perception::tone::SceneLight;
@@ -67,9 +67,9 @@ pub(super) fn settings_of(job: &Job, live: &Live, whole: Option<&SceneLight>) ->
     if visibility.is_nan() || visibility < 0.0 {
         return Err("visibility must be 0 or above".to_owned());
     }
-    let known_stops = -MOST_EXPOSURE_STOPS..=MOST_EXPOSURE_STOPS;
+    let known_stops = -MAX_EXPOSURE_STOPS..=MAX_EXPOSURE_STOPS;
     if record.exposure_stops.is_some_and(|stops| !known_stops.contains(&stops)) {
-        return Err(format!("exposure must be from -{MOST_EXPOSURE_STOPS} to {MOST_EXPOSURE_STOPS} stops"));
+        return Err(format!("exposure must be from -{MAX_EXPOSURE_STOPS} to {MAX_EXPOSURE_STOPS} stops"));
     }
     let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..job.limits };
     let mut settings = record.loop_settings(limits, &job.trace).map_err(|error| error.to_string())?;

@@ -61,12 +61,12 @@ impl Session<'_> {
     /// Looks at the picture at rest, until somebody asks for something.
     pub(super) fn look_at_rest(&mut self) {
         let shared = Arc::clone(self.shared);
-        let is_outdated = self.settings.is_outdated.replace(Box::new(move || shared.has_news()));
+        let is_cancelled = self.settings.is_cancelled.replace(Box::new(move || shared.has_news()));
         let found = look_at_rest(&self.state, &self.settings);
-        self.settings.is_outdated = is_outdated;
+        self.settings.is_cancelled = is_cancelled;
         match found {
             Ok(judgement) => self.looked_at_rest(judgement),
-            Err(JudgeError::Outdated) => {}
+            Err(JudgeError::Cancelled) => {}
             Err(error) => {
                 self.problems.meet(Cause::Look, error.to_string());
                 self.rest_look.unlooked = None;
@@ -109,7 +109,7 @@ impl Session<'_> {
                 self.problems.solve(Cause::Look);
                 Some(judgement)
             }
-            Err(JudgeError::Outdated) => None,
+            Err(JudgeError::Cancelled) => None,
             Err(error) => {
                 self.problems.meet(Cause::Look, error.to_string());
                 None

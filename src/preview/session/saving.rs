@@ -39,9 +39,9 @@ impl Session<'_> {
 
     /// Looks at the film whoever wants another picture meanwhile: what is to be kept is kept first.
     fn look_to_save(&mut self) -> Option<LastLook> {
-        let is_outdated = self.settings.is_outdated.take();
+        let is_cancelled = self.settings.is_cancelled.take();
         let judgement = self.look();
-        self.settings.is_outdated = is_outdated;
+        self.settings.is_cancelled = is_cancelled;
         let judgement = judgement?;
         let stop_reason = self.reason_to_rest(&judgement).unwrap_or(StopReason::Interrupted);
         Some(LastLook { judgement, stop_reason })

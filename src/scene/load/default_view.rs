@@ -20,14 +20,14 @@ pub struct Bounds {
 }
 
 /// Corners of triangles up to which each is put into the world; of more, the corners of their meshes' boxes are.
-const MOST_CORNERS: usize = 30_000_000;
+const MAX_CORNERS: usize = 30_000_000;
 
 /// The bounds of everything that is rendered, or somewhat larger ones where a scene places millions of triangles. Only
 /// vertices that triangles use count.
 pub fn bounds(meshes: &[Mesh], instances: &[Instance], spheres: &[Sphere]) -> Bounds {
     let corners = |instance: &Instance| 3 * meshes[instance.mesh.0 as usize].triangles.len();
     let mut all = Bounds::EMPTY;
-    if instances.iter().map(corners).sum::<usize>() <= MOST_CORNERS {
+    if instances.iter().map(corners).sum::<usize>() <= MAX_CORNERS {
         for instance in instances {
             all = all.union(Bounds::of_mesh(&meshes[instance.mesh.0 as usize], &instance.to_world));
         }

@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// No file larger than this is read: a picture, mesh or buffer above it is more likely a slip than a scene.
-const LARGEST_FILE_BYTES: u64 = 4 << 30;
+const MAX_FILE_BYTES: u64 = 4 << 30;
 
 /// Most bytes that a packed file may unpack to: a few kB can stand for gigabytes of nothing.
-const MOST_UNPACKED_BYTES: u64 = 2 << 30;
+const MAX_UNPACKED_BYTES: u64 = 2 << 30;
 
 /// Files that this process has read, by their canonical paths.
 static READ: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -40,15 +40,15 @@ pub fn count_as_read(path: &Path) {
 /// The whole file.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
     let metadata = read_file::check(path).map_err(|error| LoadError::unreadable(path, &error))?;
-    if metadata.len() > LARGEST_FILE_BYTES {
-        let problem = format!("{} MiB, at most {} MiB are read", metadata.len() >> 20, LARGEST_FILE_BYTES >> 20);
+    if metadata.len() > MAX_FILE_BYTES {
+        let problem = format!("{} MiB, at most {} MiB are read", metadata.len() >> 20, MAX_FILE_BYTES >> 20);
         return Err(LoadError::too_large(path, problem));
     }
     let file = std::fs::File::open(path).map_err(|error| LoadError::unreadable(path, &error))?;
     count_as_read(path);
     let mut bytes = Vec::with_capacity(metadata.len() as usize);
     // The limit holds again here, for files that grow while they are read.
-    file.take(LARGEST_FILE_BYTES).read_to_end(&mut bytes).map_err(|error| LoadError::unreadable(path, &error))?;
+    file.take(MAX_FILE_BYTES).read_to_end(&mut bytes).map_err(|error| LoadError::unreadable(path, &error))?;
     if bytes.is_empty() {
         return Err(LoadError::invalid(path, "the file is empty"));
     }
@@ -69,11 +69,11 @@ pub(crate) fn unpacked(decoder: impl Read, path: &Path, damaged: impl Display) -
     let mut unpacked = Vec::new();
     // One more byte than allowed tells what ends there from what goes on.
     decoder
-        .take(MOST_UNPACKED_BYTES + 1)
+        .take(MAX_UNPACKED_BYTES + 1)
         .read_to_end(&mut unpacked)
         .map_err(|error| LoadError::invalid(path, format_args!("{damaged}: {error}")))?;
-    if unpacked.len() as u64 > MOST_UNPACKED_BYTES {
-        let problem = format!("unpacks to more than {} MiB", MOST_UNPACKED_BYTES >> 20);
+    if unpacked.len() as u64 > MAX_UNPACKED_BYTES {
+        let problem = format!("unpacks to more than {} MiB", MAX_UNPACKED_BYTES >> 20);
         return Err(LoadError::too_large(path, problem));
     }
     Ok(unpacked)

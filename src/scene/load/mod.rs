@@ -154,24 +154,24 @@ fn load_alone(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 
 /// Refuses files that make many meshes out of few words: thirty bytes can ask for a sphere of ten thousand vertices.
 fn check_made_vertices(path: &Path, vertices: usize) -> Result<(), LoadError> {
-    const MOST_VERTICES: usize = 40_000_000;
-    if vertices <= MOST_VERTICES {
+    const MAX_VERTICES: usize = 40_000_000;
+    if vertices <= MAX_VERTICES {
         return Ok(());
     }
     Err(LoadError::too_large(
         path,
-        format_args!("its spheres, disks and the like need more than {MOST_VERTICES} vertices"),
+        format_args!("its spheres, disks and the like need more than {MAX_VERTICES} vertices"),
     ))
 }
 
 /// Refuses files that place things without end: few words can place a large group often, and include a file that
 /// includes others.
 fn check_placed(path: &Path, things: usize) -> Result<(), LoadError> {
-    const MOST_THINGS: usize = 4_000_000;
-    if things <= MOST_THINGS {
+    const MAX_THINGS: usize = 4_000_000;
+    if things <= MAX_THINGS {
         return Ok(());
     }
-    Err(LoadError::too_large(path, format_args!("more than {MOST_THINGS} placed meshes, spheres and lights")))
+    Err(LoadError::too_large(path, format_args!("more than {MAX_THINGS} placed meshes, spheres and lights")))
 }
 
 fn stem_ends_with(path: &Path, extension: &str) -> bool {

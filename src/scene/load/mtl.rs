@@ -293,7 +293,7 @@ impl Written {
     /// nor its readers agree on the unit of heights: at a multiplier of 1, white is here a fiftieth of the
     /// picture's width above black.
     fn relief(&self, builder: &mut Builder) -> Option<Relief> {
-        const MOST_HEIGHT: f32 = 0.02;
+        const MAX_HEIGHT: f32 = 0.02;
         if let Some(map) = self.map(&["norm"]) {
             let lookup = self.lookup(builder, map, Encoding::Linear, [128, 128, 255, 255]);
             return Some(Relief::Normals { map: lookup, strength: map.bump * map.gain });
@@ -306,7 +306,7 @@ impl Written {
         let lookup = self.lookup(builder, map, Encoding::Linear, [128; 4]);
         let heights = HeightMap {
             height: ScalarInput {
-                factor: MOST_HEIGHT * map.bump * map.gain,
+                factor: MAX_HEIGHT * map.bump * map.gain,
                 texture: Some((lookup, map.channel.unwrap_or(0).min(2))),
             },
             unit: HeightUnit::PictureWidth,

@@ -6,14 +6,14 @@ mod corner_grid;
 mod ears;
 
 /// Ear clipping is nearly quadratic: larger polygons get a fan.
-const MOST_CORNERS_TO_CLIP: usize = 50_000;
+const MAX_CORNERS_TO_CLIP: usize = 50_000;
 
 /// How a polygon's area was covered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Covering {
     /// Once, wherever it does not cross itself.
     Exact,
-    /// Covered by a fan, although a corner points inwards: there are more than [`MOST_CORNERS_TO_CLIP`].
+    /// Covered by a fan, although a corner points inwards: there are more than [`MAX_CORNERS_TO_CLIP`].
     RoughFan,
 }
 
@@ -27,7 +27,7 @@ pub(super) fn triangulate(positions: &[Vec3], polygon: &[u32], triangles: &mut V
     let flat = flatten(positions, polygon);
     let count = flat.len();
     let is_convex = (0..count).all(|i| turn(flat[(i + count - 1) % count], flat[i], flat[(i + 1) % count]) >= 0.0);
-    let is_large = count > MOST_CORNERS_TO_CLIP;
+    let is_large = count > MAX_CORNERS_TO_CLIP;
     if is_convex || is_large {
         triangles.extend(fan);
         return if is_convex { Covering::Exact } else { Covering::RoughFan };
@@ -40,7 +40,7 @@ pub(super) fn triangulate(positions: &[Vec3], polygon: &[u32], triangles: &mut V
 pub(super) fn note_of_rough_fans(file: &str, faces: usize) -> Option<String> {
     (faces > 0).then(|| {
         format!(
-            "{file}: {faces} faces of more than {MOST_CORNERS_TO_CLIP} corners are filled as fans, which is wrong where corners point \
+            "{file}: {faces} faces of more than {MAX_CORNERS_TO_CLIP} corners are filled as fans, which is wrong where corners point \
              inwards."
         )
     })
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn polygons_too_large_to_clip_are_named() {
-        let count = MOST_CORNERS_TO_CLIP + 2;
+        let count = MAX_CORNERS_TO_CLIP + 2;
         let polygon: Vec<u32> = (0..count as u32).collect();
         let mut triangles = Vec::new();
         assert_eq!(triangulate(&letter_c(count).0, &polygon, &mut triangles), Covering::RoughFan);

@@ -198,8 +198,8 @@ pub(super) fn check(scene: &Scene, path: &Path) -> Result<(), LoadError> {
     }
     for material in &scene.materials {
         let components = material.surface.components();
-        if components > Surface::MOST_COMPONENTS {
-            let most = Surface::MOST_COMPONENTS;
+        if components > Surface::MAX_COMPONENTS {
+            let most = Surface::MAX_COMPONENTS;
             let problem =
                 format!("material \"{}\" mixes {components} models; at most {most} are possible", material.name);
             return Err(LoadError::invalid(path, problem));

@@ -24,9 +24,9 @@ const BINS: usize = 100;
 const TOLERANCE: f64 = 0.025;
 /// Share of the samples that a last pass may cut: then at most a thousandth of the display's range (in logarithms) is not used.
 const SETTLED: f64 = 1e-3;
-const LEAST_CD_M2: f64 = 1e-4;
+const MIN_CD_M2: f64 = 1e-4;
 /// Each pass trims more than the tolerance, so that there are at most ln(1 / 0.025) / 0.025 = 148.
-const MOST_PASSES: usize = 200;
+const MAX_PASSES: usize = 200;
 
 /// What a display shows, in natural logarithms of cd/m².
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +61,7 @@ impl Histogram {
     /// `None` without samples.
     pub(super) fn of(samples_cd_m2: Vec<f64>) -> Option<Self> {
         let logs: Vec<f64> =
-            samples_cd_m2.into_iter().filter(|v| v.is_finite()).map(|v| v.max(LEAST_CD_M2).ln()).collect();
+            samples_cd_m2.into_iter().filter(|v| v.is_finite()).map(|v| v.max(MIN_CD_M2).ln()).collect();
         let least = logs.iter().copied().fold(f64::INFINITY, f64::min);
         let greatest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if logs.is_empty() {
@@ -97,7 +97,7 @@ impl Histogram {
     /// Passes until one cuts hardly anything; `None` where hardly anything is left.
     fn trim_as_published(&mut self, range: DisplayRange, ceiling: Ceiling) -> Option<LastPass> {
         let all: f64 = self.counts.iter().sum();
-        for passes in 1..=MOST_PASSES {
+        for passes in 1..=MAX_PASSES {
             let (before, trimmed) = self.trim(range, ceiling);
             if before - trimmed <= TOLERANCE * all {
                 return None;
@@ -127,7 +127,7 @@ impl Histogram {
     /// for all of the display's range: those before the last cut, so that every bin keeps to its ceiling.
     fn settle(&mut self, range: DisplayRange, ceiling: Ceiling, last: &mut LastPass) -> f64 {
         let least = (1.0 - TOLERANCE) * (last.before - last.trimmed);
-        while last.trimmed > SETTLED * last.before && last.passes < MOST_PASSES {
+        while last.trimmed > SETTLED * last.before && last.passes < MAX_PASSES {
             let mut next = self.clone();
             let (before, trimmed) = next.trim(range, ceiling);
             if before - trimmed < least {
@@ -218,7 +218,7 @@ pub(super) struct Curve {
 
 impl Curve {
     fn display_cd_m2(&self, scene_cd_m2: f64) -> f64 {
-        let place = (scene_cd_m2.max(LEAST_CD_M2).ln() - self.least) / self.step;
+        let place = (scene_cd_m2.max(MIN_CD_M2).ln() - self.least) / self.step;
         let edges = Between::of(place, self.cumulative.len());
         let [low, high] = [edges.below, edges.above].map(|edge| self.cumulative.get(edge).copied().unwrap_or(0.0));
         (self.range_least + self.range * edges.value(low, high)).exp()

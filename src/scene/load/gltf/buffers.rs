@@ -9,7 +9,7 @@ use gltf::accessor::DataType;
 use std::path::{Path, PathBuf};
 
 /// Most elements that one accessor may claim: zero-filled ones have no bytes in the file that would bound them.
-const MOST_ELEMENTS: usize = 100_000_000;
+const MAX_ELEMENTS: usize = 100_000_000;
 
 /// With or without "=" at its end: writers differ.
 const LENIENT_BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -208,8 +208,8 @@ impl Buffers {
             return Err(self.wrong(accessor, format_args!("expected elements of {N} numbers")));
         }
         let count = accessor.count();
-        if count > MOST_ELEMENTS {
-            return Err(self.wrong(accessor, format_args!("{count} elements, at most {MOST_ELEMENTS} are read")));
+        if count > MAX_ELEMENTS {
+            return Err(self.wrong(accessor, format_args!("{count} elements, at most {MAX_ELEMENTS} are read")));
         }
         let width = accessor.data_type().size();
         let element = |bytes: &[u8]| std::array::from_fn(|place| decode(&bytes[place * width..(place + 1) * width]));

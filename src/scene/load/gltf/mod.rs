@@ -28,10 +28,10 @@ use std::path::Path;
 /// Deepest chain of nodes; the recursion would otherwise end at the stack's size.
 const DEEPEST_NODE: usize = 256;
 /// Most placed nodes: one below many parents is placed once for each.
-const MOST_NODES: usize = 4_000_000;
+const MAX_NODES: usize = 4_000_000;
 
 /// Width over height, or the inverse, beyond which a camera's aspect is taken for a slip.
-const MOST_OBLONG: f32 = 100.0;
+const MAX_OBLONG: f32 = 100.0;
 
 /// Reads a glTF or GLB file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
@@ -115,8 +115,8 @@ impl<'a> Reader<'a> {
         if self.ancestors.len() >= DEEPEST_NODE {
             return Err(LoadError::invalid(self.path, format_args!("nodes nested deeper than {DEEPEST_NODE}")));
         }
-        if self.placed.len() >= MOST_NODES {
-            return Err(LoadError::too_large(self.path, format_args!("more than {MOST_NODES} placed nodes")));
+        if self.placed.len() >= MAX_NODES {
+            return Err(LoadError::too_large(self.path, format_args!("more than {MAX_NODES} placed nodes")));
         }
         let posed = self.moments.iter().zip(parents);
         let matrices: Vec<Mat4> =
@@ -327,7 +327,7 @@ impl<'a> Reader<'a> {
                 (Projection::Orthographic { height }, aspect, height > 0.0 && height.is_finite())
             }
         };
-        let aspect = aspect.filter(|aspect| (MOST_OBLONG.recip()..=MOST_OBLONG).contains(aspect));
+        let aspect = aspect.filter(|aspect| (MAX_OBLONG.recip()..=MAX_OBLONG).contains(aspect));
         let (Some(forward), Some(up)) = (forward, up) else {
             return;
         };

@@ -12,7 +12,7 @@ use std::path::Path;
 /// Between two keys what turns about a parent moves on an arc; so many chords of the open shutter stand for it.
 const STEPS: u32 = 8;
 /// Keys inside the shutter that are met exactly; a shutter rarely holds one.
-const MOST_KEYS: usize = 64;
+const MAX_KEYS: usize = 64;
 /// Size of what is hidden by a scale of 0, as share of its own: small beyond any pixel, and still a transform that can
 /// be undone.
 const SPECK: f32 = 1e-4;
@@ -56,7 +56,7 @@ fn at_keys(mut keys: Vec<KeyTime>, shutter: Shutter) -> Vec<(f32, f64)> {
     keys.sort_by(|a, b| a.seconds.total_cmp(&b.seconds).then(b.jumps.cmp(&a.jumps)));
     keys.dedup_by_key(|key| key.seconds);
     let mut times = Vec::new();
-    for KeyTime { seconds, jumps } in keys.into_iter().take(MOST_KEYS) {
+    for KeyTime { seconds, jumps } in keys.into_iter().take(MAX_KEYS) {
         let share = ((f64::from(seconds) - shutter.opens) / shutter.stays_open).min(1.0) as f32;
         let before = f64::from(seconds.next_down());
         match (seconds < closes, jumps) {

@@ -189,7 +189,7 @@ impl Reader {
             return Err(bsdf.unsupported("a blend with \"null\" by a picture is only rendered with \"null\" first"));
         };
         let mixed = Surface::Mix { first: Box::new(first), second: Box::new(second), amount };
-        let most = Surface::MOST_COMPONENTS;
+        let most = Surface::MAX_COMPONENTS;
         if mixed.components() > most {
             return Err(bsdf.unsupported(format_args!("mixes of more than {most} BSDFs are not rendered")));
         }

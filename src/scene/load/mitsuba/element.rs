@@ -15,7 +15,7 @@ use std::rc::Rc;
 /// Deepest nesting of elements and of includes.
 const DEEPEST: usize = 64;
 /// Most elements of a document, and of all that it includes.
-const MOST_NODES: u32 = 4_000_000;
+const MAX_NODES: u32 = 4_000_000;
 
 /// Most bytes of a text whose `$name` are replaced: values that hold values grow without bounds.
 const LONGEST_VALUE: usize = 1 << 12;
@@ -84,7 +84,7 @@ fn parent_or_empty(file: &Path) -> &Path {
 /// Reads a file and all that it includes.
 pub(super) fn read(path: &Path, given: &mut Given, depth: usize) -> Result<Rc<Element>, LoadError> {
     let text = files::decode_text(path, files::read_unpacked(path)?)?;
-    let options = roxmltree::ParsingOptions { nodes_limit: MOST_NODES, ..Default::default() };
+    let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..Default::default() };
     let document = roxmltree::Document::parse_with_options(&text, options).map_err(|error| {
         LoadError::invalid_at(Place::line(path, error.pos().row as usize), format_args!("not valid XML: {error}"))
     })?;
@@ -112,10 +112,10 @@ impl TreeBuilder<'_> {
             return Err(LoadError::invalid_at(place, format_args!("elements nested deeper than {DEEPEST}")));
         }
         self.given.elements += 1;
-        if self.given.elements > MOST_NODES {
+        if self.given.elements > MAX_NODES {
             return Err(LoadError::too_large(
                 &self.file,
-                format_args!("more than {MOST_NODES} elements with those included"),
+                format_args!("more than {MAX_NODES} elements with those included"),
             ));
         }
         let mut attributes = Vec::new();

@@ -101,7 +101,7 @@ pub(super) fn report_unknown_materials(
         return;
     }
     // What a file of thousands needs to be told is that its library is another one's.
-    const MOST_NAMED: usize = 10;
+    const MAX_NAMED: usize = 10;
     let names = || known.iter().map(|material| material.name.as_str());
     let is_known: HashSet<&str> = names().collect();
     let (mut named, mut others) = (Vec::new(), HashSet::new());
@@ -112,7 +112,7 @@ pub(super) fn report_unknown_materials(
         if is_known.contains(name) {
             continue;
         }
-        if named.len() < MOST_NAMED && !named.contains(&name) {
+        if named.len() < MAX_NAMED && !named.contains(&name) {
             named.push(name);
         }
         if named.contains(&name) {

@@ -18,7 +18,7 @@ use std::rc::Rc;
 const DEEPEST: usize = 16;
 
 /// What a metal may reflect face on: for all light k would be infinite.
-const MOST_REFLECTED: Vec3 = Vec3::splat(0.9999);
+const MAX_REFLECTED: Vec3 = Vec3::splat(0.9999);
 
 /// Reads a material that wraps no other.
 type Plain<'a> = fn(&mut Reader<'a>, &Parameters) -> Result<Surface, LoadError>;
@@ -111,8 +111,8 @@ impl Reader<'_> {
     pub(super) fn convert_material(&mut self, definition: &Definition) -> Result<Option<Material>, LoadError> {
         let parameters = &definition.parameters;
         let Some(surface) = self.surface(definition, 0)? else { return Ok(None) };
-        if surface.components() > Surface::MOST_COMPONENTS {
-            let most = Surface::MOST_COMPONENTS;
+        if surface.components() > Surface::MAX_COMPONENTS {
+            let most = Surface::MAX_COMPONENTS;
             return Err(parameters.unsupported(format_args!("mixes of more than {most} materials are not rendered")));
         }
         let mut material = Material::plain(definition.name.clone(), surface);
@@ -245,7 +245,7 @@ impl Reader<'_> {
                 self.builder.note(format!("{}: relief of a mix's parts is not rendered.", part.place()));
             }
             // Nested mixes double at each level: stop before they are many.
-            let most = Surface::MOST_COMPONENTS;
+            let most = Surface::MAX_COMPONENTS;
             if surface.as_ref().is_some_and(|surface| surface.components() > most) {
                 return Err(
                     parameters.unsupported(format_args!("mixes of more than {most} materials are not rendered"))
@@ -278,7 +278,7 @@ impl Reader<'_> {
             parameters.place()
         ));
         let brightest =
-            (color.factor * self.builder.textures.brightest(lookup.texture)?).clamp(Vec3::ZERO, MOST_REFLECTED);
+            (color.factor * self.builder.textures.brightest(lookup.texture)?).clamp(Vec3::ZERO, MAX_REFLECTED);
         let Metal { eta, k } = metal_that_reflects(brightest);
         let factor = color.factor / brightest.max(Vec3::splat(f32::MIN_POSITIVE));
         let tint = ColorInput { factor: factor.min(Vec3::MAX), texture: color.texture };
@@ -346,6 +346,6 @@ fn not_read(parameters: &Parameters, kind: &str) -> LoadError {
 
 /// The η and k that reflect a colour at normal incidence as pbrt makes them: η = 1, k = 2√r / √(1 − r).
 fn metal_that_reflects(color: Vec3) -> Metal {
-    let r = color.clamp(Vec3::ZERO, MOST_REFLECTED);
+    let r = color.clamp(Vec3::ZERO, MAX_REFLECTED);
     Metal { eta: Vec3::ONE, k: 2.0 * (r / (Vec3::ONE - r)).powf(0.5) }
 }

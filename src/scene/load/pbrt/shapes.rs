@@ -323,11 +323,11 @@ fn triangle_mesh(parameters: &Parameters, name: &str) -> Result<Mesh, LoadError>
 /// Patches as grids of 8 × 8: exact where they are flat.
 fn bilinear_mesh(parameters: &Parameters) -> Result<Mesh, LoadError> {
     const STEPS: u32 = 8;
-    const MOST_PATCHES: usize = 1 << 17;
+    const MAX_PATCHES: usize = 1 << 17;
     let from = vertices(parameters)?;
     let patches: Vec<[u32; 4]> = indices(parameters, "indices", from.positions.len())?;
-    if patches.len() > MOST_PATCHES {
-        return Err(parameters.error(format_args!("more than {MOST_PATCHES} bilinear patches")));
+    if patches.len() > MAX_PATCHES {
+        return Err(parameters.error(format_args!("more than {MAX_PATCHES} bilinear patches")));
     }
     let mut mesh = Mesh::default();
     for patch in &patches {

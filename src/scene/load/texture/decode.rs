@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// Widest and highest picture that is decoded.
 const LONGEST_SIDE: u32 = 16_384;
 /// Most bytes that one decoded picture may take.
-const MOST_BYTES: u64 = 512 << 20;
+const MAX_BYTES: u64 = 512 << 20;
 
 /// A decoded picture.
 #[derive(Clone, Debug)]
@@ -175,7 +175,7 @@ fn limited<R: std::io::BufRead + std::io::Seek>(mut reader: ImageReader<R>) -> I
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(LONGEST_SIDE);
     limits.max_image_height = Some(LONGEST_SIDE);
-    limits.max_alloc = Some(MOST_BYTES);
+    limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
     reader
 }
@@ -304,8 +304,8 @@ fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Res
         return Err(LoadError::invalid(name, format_args!("the picture is empty ({width} x {height} pixels)")));
     }
     let side = u64::from(LONGEST_SIDE);
-    if width > side || height > side || width * height * bytes_per_texel > MOST_BYTES {
-        let limit = MOST_BYTES / bytes_per_texel / 1_000_000;
+    if width > side || height > side || width * height * bytes_per_texel > MAX_BYTES {
+        let limit = MAX_BYTES / bytes_per_texel / 1_000_000;
         return Err(LoadError::too_large(
             name,
             format_args!(

@@ -18,7 +18,7 @@ use super::error::LoadError;
 use super::framing::Framing;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use super::{LoadOptions, Shutter, files};
-use crate::scene::{Encoding, FilmDefaults, MOST_EXPOSURE_STOPS, NITS_PER_UNIT, Scene, ViewingDefaults, Wrap};
+use crate::scene::{Encoding, FilmDefaults, MAX_EXPOSURE_STOPS, NITS_PER_UNIT, Scene, ViewingDefaults, Wrap};
 use fechner_perception::display::Display;
 use fechner_perception::tone;
 use std::collections::HashMap;
@@ -201,7 +201,7 @@ fn read_view(value: &Value, folder: &Path) -> Result<ViewingDefaults, LoadError>
         visibility: fields.get_some("visibility", Value::positive)?,
         operator: fields.get_some("operator", read_operator)?,
         exposure_stops: fields
-            .get_some("exposure_stops", |stops| stops.within(-MOST_EXPOSURE_STOPS, MOST_EXPOSURE_STOPS))?,
+            .get_some("exposure_stops", |stops| stops.within(-MAX_EXPOSURE_STOPS, MAX_EXPOSURE_STOPS))?,
     })
 }
 
