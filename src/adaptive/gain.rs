@@ -155,7 +155,7 @@ pub(super) fn defended(energies: &[f32]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::judge::{judge, judge_to_plan};
+    use super::super::judge::{LookFor, judge, judge_for};
     use super::super::plan::plan_up_to;
     use super::super::test_films::{film_of, film_of_halves, settings};
     use super::*;
@@ -226,7 +226,7 @@ mod tests {
             };
             let shines = |pixel: u32| pixel % 8 < 3 || pixel == RIM;
             let film = film_of_halves([8; 2], shines, |pixel, half, _| Vec3::splat(grey(pixel, half)));
-            let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
+            let judgement = judge_for(LookFor::Plan, &film, &settings(), 1.0).expect("judges");
             let energies = Energies::of(&film, &judgement);
             gains(&film, &energies)(&BlockWork::whole(RIM, Half::A, 1))
         };
@@ -242,7 +242,7 @@ mod tests {
         let mut lamps = KnownThings::new(film.pixel_count());
         (0..film.pixel_count()).filter(|pixel| pixel % 64 < 8).for_each(|pixel| lamps.add(pixel, 0.005, 200.0, true));
         film.known_things = Some(lamps);
-        let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
+        let judgement = judge_for(LookFor::Plan, &film, &settings(), 1.0).expect("judges");
         let energies = Energies::of(&film, &judgement);
         for half in Half::BOTH {
             let of_half = energies.of_half(half);

@@ -84,15 +84,20 @@ pub enum JudgeError {
 /// # Errors
 /// If the denoiser fails, or the perception model refuses the film's maps.
 pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
-    judge_by(settings.denoiser.as_ref(), film, settings, inflation, Purpose::Report)
+    judge_for(LookFor::Report, film, settings, inflation)
 }
 
-/// The same with all that a plan is made of, which makes a raw look dearer.
+/// [`judge`], with all that is asked for.
 ///
 /// # Errors
 /// As [`judge`].
-pub(super) fn judge_to_plan(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
-    judge_by(settings.denoiser.as_ref(), film, settings, inflation, Purpose::Plan)
+pub(super) fn judge_for(
+    look_for: LookFor,
+    film: &Film,
+    settings: &LoopSettings,
+    inflation: f64,
+) -> Result<Judgement, JudgeError> {
+    judge_by(settings.denoiser.as_ref(), film, settings, inflation, look_for)
 }
 
 /// The same of the raw mean, which costs a tenth of a look at a denoised picture.
@@ -100,15 +105,15 @@ pub(super) fn judge_to_plan(film: &Film, settings: &LoopSettings, inflation: f64
 /// # Errors
 /// If the perception model refuses the film's maps.
 pub(super) fn judge_raw(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeError> {
-    judge_by(None, film, settings, 1.0, Purpose::Report)
+    judge_by(None, film, settings, 1.0, LookFor::Report)
 }
 
 /// What a look is for.
 #[derive(Clone, Copy, PartialEq)]
-enum Purpose {
+pub(super) enum LookFor {
     /// To say what is seen.
     Report,
-    /// And what each half makes of it.
+    /// And to plan: with what each half makes of it, which makes a raw look dearer.
     Plan,
 }
 
@@ -121,7 +126,7 @@ fn judge_by(
     film: &Film,
     settings: &LoopSettings,
     inflation: f64,
-    purpose: Purpose,
+    look_for: LookFor,
 ) -> Result<Judgement, JudgeError> {
     let started = Instant::now();
     let estimate = film.estimate(settings.nits_per_unit);
@@ -151,13 +156,13 @@ fn judge_by(
         inflation: raw_inflation,
     };
     let per_sample = match &denoised {
-        None => PerSample::of_raw(&sources, purpose)?,
-        Some(_) => PerSample::of_denoised(&sources, purpose)?,
+        None => PerSample::of_raw(&sources, look_for)?,
+        Some(_) => PerSample::of_denoised(&sources, look_for)?,
     };
     check_cancelled(settings)?;
     let over_white = if settings.is_transparent {
         let colour_scale = denoised.is_none().then(|| scatter.luminance_scale());
-        Some(OverWhite::of(film, &guide, &displayed_guide, colour_scale, tone.as_ref(), settings, purpose)?)
+        Some(OverWhite::of(film, &guide, &displayed_guide, colour_scale, tone.as_ref(), settings, look_for)?)
     } else {
         None
     };

@@ -1,9 +1,37 @@
-//! The loop: pilot, estimate, threshold map, plan, trace, until nothing more can be seen.
+//! The loop: trace, look, plan, until nothing more can be seen.
 //!
-//! [`render`] is the heart of the program. It walks a fixed ladder of visibilities and leaves each rung only when the
-//! picture has reached it, so that a preview is a prefix of the final picture. What to do next is decided in `next`
-//! and counted out in [`plan`]; what the eye sees is asked of the perception crate in [`mod@judge`]; variance is in
-//! [`statistics`].
+//! The loop itself is [`Loop::run_to_end`]; [`render`], [`resume`] and [`run`] lead to it. In turn it
+//!
+//! 1. traces what is planned (`trace_pending`): at first a pilot of some samples in every pixel;
+//! 2. looks at the film as an eye in front of the display would ([`mod@judge`]): thresholds, and how visible the noise is;
+//! 3. decides by that look (`next_step`) whether the rung of the ladder that it is on is reached, audits it by fresh samples, and
+//!    goes on to the next;
+//! 4. or plans more samples ([`plan`]): the cheapest counts that reach the rung;
+//! 5. ends when the last rung is reached, when a limit is, or when no pixel may have more.
+//!
+//! The ladder of visibilities is fixed, so that a render is the beginning of any that goes on from it on the same ladder: one above
+//! threshold, one from there down.
+//!
+//! | file | answers |
+//! | --- | --- |
+//! | `settings`, `limits`, `stop` | what is asked for, what ends a render, why it ended |
+//! | `state`, `outcome` | what a checkpoint holds, and what comes out |
+//! | `judge`, `statistics` | what is seen, by what variance |
+//! | `confidence` | how sure that is, over all looks |
+//! | `next` | what comes after a look |
+//! | `plan`, `forecast` | which pixels get how many samples, and what they will leave to be seen |
+//! | `gain` | which of these samples come first, on the way to threshold |
+//! | `leftover` | whose noise it is that still shows where every pixel has what it needs |
+//! | `audit` | whether the picture is as noisy as it is told to be |
+//! | `missed`, `small_things` | what no sample has met: rims of lamps, things smaller than a pixel |
+//! | `denoised`, `until_look` | the same of a picture that is denoised, and what it gets between two looks |
+//! | `pursuit` | eyes that follow what moves |
+//! | `rivals` | other renderers' rules |
+//! | `glimpse` | how light a view is before it is rendered |
+//! | `monitor`, `progress` | what is told meanwhile |
+//! | `awake` | threads that do not fall asleep during a look |
+//!
+//! Nothing here traces a ray or knows a formula of vision: the first is the [`crate::integrator`]'s, the second the perception crate's.
 
 pub mod audit;
 mod awake;
@@ -18,6 +46,7 @@ mod limits;
 mod missed;
 mod monitor;
 mod next;
+mod outcome;
 pub mod plan;
 mod progress;
 pub mod pursuit;
@@ -32,14 +61,13 @@ mod test_films;
 mod until_look;
 
 pub use monitor::{Directive, Monitor, Progress, Quiet};
+pub use outcome::{Ended, LastLook, Next, Rendered};
 pub use stop::{StopReason, TOLERATED_SHARE, is_reached, visible_share};
 
-use crate::film::Film;
 use crate::integrator::{BlockWork, Crop, PathTracer, SamplePlan};
-use audit::Audit;
 use awake::with_threads_awake;
 use confidence::{factor_of_bound, standard_errors};
-use judge::{JudgeError, Judgement, judge, judge_to_plan};
+use judge::{JudgeError, Judgement, LookFor, judge_for};
 use plan::slices;
 use progress::progress;
 use settings::LoopSettings;
@@ -48,58 +76,6 @@ use std::cell::OnceCell;
 use std::collections::VecDeque;
 use std::time::Instant;
 use until_look::UntilLook;
-
-/// A finished render.
-#[derive(Debug)]
-pub struct Rendered {
-    /// All samples.
-    pub film: Film,
-    /// The last look at it.
-    pub judgement: Judgement,
-    /// Why it ended.
-    pub stop_reason: StopReason,
-    /// Plans traced.
-    pub plans: u32,
-    /// The last audit, where the picture was large enough for one.
-    pub audit: Option<Audit>,
-    /// What audits multiplied the variance by.
-    pub inflation: f64,
-    /// What it took to its end.
-    pub seconds: Seconds,
-}
-
-impl Rendered {
-    /// A state's end and the last look at it.
-    pub fn new(state: RenderState, judgement: Judgement, stop_reason: StopReason) -> Self {
-        Self {
-            film: state.film,
-            judgement,
-            stop_reason,
-            plans: state.plans,
-            audit: state.audit,
-            inflation: state.inflation,
-            seconds: state.seconds,
-        }
-    }
-}
-
-/// A render as its loop left it.
-#[derive(Debug)]
-pub struct Ended {
-    /// What a render to another limit would go on from.
-    pub state: RenderState,
-    /// The last look and why the render ended; `None` if it was left without a look.
-    pub last_look: Option<LastLook>,
-}
-
-/// Why a render ended, and what it was like then.
-#[derive(Debug)]
-pub struct LastLook {
-    /// What was seen.
-    pub judgement: Judgement,
-    /// Why it ended.
-    pub stop_reason: StopReason,
-}
 
 /// What a look saw, and what comes of it.
 struct Decision {
@@ -135,12 +111,9 @@ struct Loop<'a> {
     samples_to_meet_lamps: OnceCell<Option<Vec<u32>>>,
 }
 
-/// [`judge()`] or [`judge_to_plan`].
-type Judge = fn(&Film, &LoopSettings, f64) -> Result<Judgement, JudgeError>;
-
 /// Looks at a render as it is, with what audits and earlier looks make of that.
-fn look_at(state: &RenderState, settings: &LoopSettings, judge: Judge) -> Result<Judgement, JudgeError> {
-    let mut judgement = judge(&state.film, settings, state.inflation)?;
+fn look_at(state: &RenderState, settings: &LoopSettings, look_for: LookFor) -> Result<Judgement, JudgeError> {
+    let mut judgement = judge_for(look_for, &state.film, settings, state.inflation)?;
     if let Some(confidence) = settings.limits.confidence {
         let standard_errors = standard_errors(confidence, state.looks);
         if let Some(factor) = factor_of_bound(&judgement, state, standard_errors) {
@@ -153,9 +126,9 @@ fn look_at(state: &RenderState, settings: &LoopSettings, judge: Judge) -> Result
 /// What is seen of a render that rests, as its next look would see it.
 ///
 /// # Errors
-/// As [`judge()`].
+/// As [`judge::judge`].
 pub fn look_at_rest(state: &RenderState, settings: &LoopSettings) -> Result<Judgement, JudgeError> {
-    look_at(state, settings, judge)
+    look_at(state, settings, LookFor::Report)
 }
 
 /// The last look of this run.
@@ -189,7 +162,7 @@ pub fn resume(
     let LastLook { judgement, stop_reason } = match last_look {
         Some(last_look) => last_look,
         None => {
-            let judgement = look_at(&state, settings, judge).inspect_err(|_| monitor.failed(&state))?;
+            let judgement = look_at(&state, settings, LookFor::Report).inspect_err(|_| monitor.failed(&state))?;
             let Judgement { seconds, seconds_denoising: denoising, .. } = judgement;
             state.seconds += Seconds { total: seconds, perception: seconds, allocation: 0.0, denoising };
             LastLook { judgement, stop_reason: StopReason::Interrupted }
@@ -210,7 +183,7 @@ pub fn run(
     monitor: &dyn Monitor,
 ) -> Result<Ended, JudgeError> {
     let mut render = Loop::new(tracer, settings, state);
-    match render.until_last_look(monitor) {
+    match render.run_to_end(monitor) {
         Ok(Some(LastLook { judgement, stop_reason })) => Ok(render.end(judgement, stop_reason, monitor)),
         Ok(None) | Err(JudgeError::Cancelled) => Ok(Ended { state: render.state, last_look: None }),
         Err(error) => {
@@ -218,15 +191,6 @@ pub fn run(
             Err(error)
         }
     }
-}
-
-/// What comes after a state all of whose plans are traced.
-#[derive(Debug)]
-pub enum Next {
-    /// More is planned, and not traced.
-    Planned(Box<RenderState>),
-    /// Nothing.
-    Ended(Box<Ended>),
 }
 
 /// One look of [`run`]'s loop at a state all of whose plans are traced, for somebody who traces elsewhere and has the state's file.
@@ -243,9 +207,9 @@ pub fn decide(
     let mut render = Loop::new(tracer, settings, state);
     if !render.plans_without_a_look()? {
         let look = Instant::now();
-        let mut judgement = render.look(judge_to_plan)?;
+        let mut judgement = render.look(LookFor::Plan)?;
         let step = render.next_step(&mut judgement)?;
-        if let Some(reason) = render.take(step, &judgement, look, monitor) {
+        if let Some(reason) = render.apply(step, &judgement, look, monitor) {
             let judgement = render.last_judgement(judgement)?;
             return Ok(Next::Ended(Box::new(render.end(judgement, reason, monitor))));
         }
@@ -278,7 +242,7 @@ impl<'a> Loop<'a> {
     }
 
     /// Traces, looks and plans in turn; `None` if the monitor leaves the render.
-    fn until_last_look(&mut self, monitor: &dyn Monitor) -> Result<Option<LastLook>, JudgeError> {
+    fn run_to_end(&mut self, monitor: &dyn Monitor) -> Result<Option<LastLook>, JudgeError> {
         let mut last_look: Option<Judgement> = None;
         loop {
             let ended = match self.trace_pending(monitor) {
@@ -292,7 +256,7 @@ impl<'a> Loop<'a> {
             let look = Instant::now();
             let earlier = last_look.take();
             let Decision { judgement, step } = with_threads_awake(|| self.look_and_decide(earlier, ended))?;
-            match self.take(step, &judgement, look, monitor) {
+            match self.apply(step, &judgement, look, monitor) {
                 None => last_look = Some(judgement),
                 Some(stop_reason) => {
                     return Ok(Some(LastLook { judgement: self.last_judgement(judgement)?, stop_reason }));
@@ -302,13 +266,13 @@ impl<'a> Loop<'a> {
     }
 
     /// Tells what was seen and enters the plan that came of it, or says why there is none.
-    fn take(&mut self, step: Step, judgement: &Judgement, look: Instant, monitor: &dyn Monitor) -> Option<StopReason> {
+    fn apply(&mut self, step: Step, judgement: &Judgement, look: Instant, monitor: &dyn Monitor) -> Option<StopReason> {
         self.state.seconds.perception += look.elapsed().as_secs_f64();
         monitor.looked(&progress(self, judgement, &step));
         monitor.judged(&self.state, judgement);
         match step {
             Step::Trace(plan) => {
-                self.enter(plan);
+                self.queue(plan);
                 self.state.looks += 1;
                 self.state.tone = Some(judgement.tone.save());
                 None
@@ -317,7 +281,7 @@ impl<'a> Loop<'a> {
         }
     }
 
-    fn enter(&mut self, plan: SamplePlan) {
+    fn queue(&mut self, plan: SamplePlan) {
         let film = &self.state.film;
         self.state.pending.extend(slices(plan, film.width(), film.total_samples()));
     }
@@ -327,9 +291,9 @@ impl<'a> Loop<'a> {
     }
 
     /// Looks at the film, to plan more of it or at the end.
-    fn look(&mut self, judge: Judge) -> Result<Judgement, JudgeError> {
+    fn look(&mut self, look_for: LookFor) -> Result<Judgement, JudgeError> {
         let started = Instant::now();
-        let judgement = look_at(&self.state, self.settings, judge)?;
+        let judgement = look_at(&self.state, self.settings, look_for)?;
         self.state.seconds.denoising += judgement.seconds_denoising;
         let at_samples = self.state.film.total_samples();
         self.looked = Some(LookTaken { at_samples, seconds: started.elapsed().as_secs_f64() });
@@ -344,8 +308,8 @@ impl<'a> Loop<'a> {
     ) -> Result<Decision, JudgeError> {
         let mut judgement = match earlier {
             Some(earlier) if self.is_looked_at() || ended.is_none() && self.exposure_holds() => earlier,
-            _ if ended.is_some() => self.look(judge)?,
-            _ => self.look(judge_to_plan)?,
+            _ if ended.is_some() => self.look(LookFor::Report)?,
+            _ => self.look(LookFor::Plan)?,
         };
         let step = match ended {
             Some(reason) => Step::Stop(reason),
@@ -389,7 +353,7 @@ impl<'a> Loop<'a> {
         if self.settings.sampling.is_by_sight() || self.is_looked_at() {
             return Ok(judgement);
         }
-        let last = self.look(judge)?;
+        let last = self.look(LookFor::Report)?;
         self.state.seconds.perception += last.seconds;
         Ok(last)
     }

@@ -4,7 +4,7 @@
 use super::audit::{Audit, MAX_INFLATION, audit, audit_unproven};
 use super::forecast::Forecast;
 use super::gain::{cut, most_worthwhile, while_far};
-use super::judge::{JudgeError, Judgement, check_cancelled, judge_raw, judge_to_plan};
+use super::judge::{JudgeError, Judgement, LookFor, check_cancelled, judge_raw};
 use super::leftover::of_what_shows;
 use super::plan::{
     SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, plan_up_to, uniform_plan, wanted_samples,
@@ -87,17 +87,17 @@ impl Loop<'_> {
         }))
     }
 
-    /// Enters a plan that takes no look, where there is one; false when it is time for a look. Such plans are for lamps
+    /// Queues a plan that takes no look, where there is one; false when it is time for a look. Such plans are for lamps
     /// that are known to be there, for what is left of a budget where that is hardly more than a look costs, and, by
     /// raw noise alone, between two looks at a picture that is denoised.
     pub(super) fn plans_without_a_look(&mut self) -> Result<bool, JudgeError> {
         let left = self.left_of_budget();
         if let Some(plan) = self.plan_to_meet_lamps(left) {
-            self.enter(plan);
+            self.queue(plan);
             return Ok(true);
         }
         if self.has_little_left_after_its_first_samples(left) {
-            self.enter(even_plan(&self.state.film, left, self.settings.limits.max_samples));
+            self.queue(even_plan(&self.state.film, left, self.settings.limits.max_samples));
             return Ok(true);
         }
         if self.settings.denoiser.is_none() || !self.settings.sampling.is_by_sight() || left == 0 {
@@ -125,7 +125,7 @@ impl Loop<'_> {
         if plan.blocks.is_empty() {
             return Ok(false);
         }
-        self.enter(plan);
+        self.queue(plan);
         Ok(true)
     }
 
@@ -271,7 +271,7 @@ impl Loop<'_> {
         self.state.audit = found.or(self.state.audit);
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(AuditOutcome::Holds) };
         self.state.inflation = (self.state.inflation * found.ratio).min(MAX_INFLATION);
-        Ok(AuditOutcome::Stricter(Box::new(self.look(judge_to_plan)?)))
+        Ok(AuditOutcome::Stricter(Box::new(self.look(LookFor::Plan)?)))
     }
 
     /// The exposure that rules without sight are told: measured anew at each doubling of the samples.

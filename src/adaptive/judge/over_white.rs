@@ -8,7 +8,7 @@
 
 use super::super::settings::LoopSettings;
 use super::steps::{Guide, Scatter, Thresholds, found_thresholds};
-use super::{JudgeError, Purpose, variance_share, without_noise};
+use super::{JudgeError, LookFor, variance_share, without_noise};
 use crate::film::Film;
 use fechner_perception::Plane;
 use fechner_perception::tone::FittedTone;
@@ -38,7 +38,7 @@ impl OverWhite {
         colour_scale: Option<&Plane>,
         tone: &dyn FittedTone,
         settings: &LoopSettings,
-        purpose: Purpose,
+        look_for: LookFor,
     ) -> Result<Self, JudgeError> {
         let display = &settings.viewing.display;
         let white_cd_m2 = display.luminance_cd_m2(1.0);
@@ -54,7 +54,7 @@ impl OverWhite {
         let pooled_per_sample = scatter.pooled_per_sample(&thresholds.in_bands, None);
         let of_mean = scatter.of_mean(&pooled_per_sample);
         let visibility = thresholds.visibility(&of_mean);
-        let per_sample_of_halves = (purpose == Purpose::Plan)
+        let per_sample_of_halves = (look_for == LookFor::Plan)
             .then(|| scatter.per_sample_of_halves(&over, [scatter.scales(); 2], &thresholds.in_bands, None));
         let ground_half_difference = ground_half_difference(film, ground_cd_m2);
         Ok(Self { thresholds, visibility, pooled_per_sample, per_sample_of_halves, ground_half_difference })

@@ -4,7 +4,7 @@ use super::super::missed::FoundLight;
 use super::super::settings::LoopSettings;
 use super::over_white::OverWhite;
 use super::steps::{Guide, MissedNoise, Scatter, Thresholds, chromatic_gains};
-use super::{JudgeError, Purpose, check_cancelled};
+use super::{JudgeError, LookFor, check_cancelled};
 use crate::film::Film;
 use crate::sampler::Half;
 use fechner_perception::Plane;
@@ -38,17 +38,17 @@ pub(super) struct Sources<'a> {
 
 impl PerSample {
     /// Variance of a picture that stays raw: by what samples have met, and may have missed.
-    pub(super) fn of_raw(sources: &Sources<'_>, purpose: Purpose) -> Result<Self, JudgeError> {
+    pub(super) fn of_raw(sources: &Sources<'_>, look_for: LookFor) -> Result<Self, JudgeError> {
         let &Sources { film, scatter, tone, settings, .. } = sources;
         let lights = sources.lights();
-        let met = Self::met(sources, (purpose == Purpose::Plan).then_some(&lights))?;
+        let met = Self::met(sources, (look_for == LookFor::Plan).then_some(&lights))?;
         Ok(met.or_missed(&lights, |light| scatter.missed_noise(film, light, tone, settings)))
     }
 
     /// Variance of a picture that is denoised, by what samples have met: what lamps' rims hide is in the
     /// denoised picture's own error.
-    pub(super) fn of_denoised(sources: &Sources<'_>, purpose: Purpose) -> Result<Self, JudgeError> {
-        Self::met(sources, (purpose == Purpose::Plan).then(|| sources.lights()).as_ref())
+    pub(super) fn of_denoised(sources: &Sources<'_>, look_for: LookFor) -> Result<Self, JudgeError> {
+        Self::met(sources, (look_for == LookFor::Plan).then(|| sources.lights()).as_ref())
     }
 
     /// By what samples have met; and of the halves, where these are to decide by the light that they have found.

@@ -86,7 +86,7 @@ fn a_half_does_not_go_by_its_own_luck() {
             };
             let is_lamp = |pixel| shines && [RIM, LAMP].contains(&pixel);
             let film = film_of_halves([8, 8], is_lamp, |pixel, half, random| Vec3::splat(grey(pixel, half, random)));
-            let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
+            let judgement = judge_for(LookFor::Plan, &film, &settings(), 1.0).expect("judges");
             judgement.variance_per_sample.expect("is to plan by").map(|half| half.values()[RIM as usize])
         };
         let ([a, b], [lucky_a, lucky_b]) = (of_halves(1.0), of_halves(20.0));
@@ -145,7 +145,7 @@ fn a_rim_that_no_sample_met_is_seen() {
         _ => 0.01,
     };
     let film = film_of_lamps(|pixel, _| Vec3::splat(radiance(pixel)), |pixel| column(pixel) <= 32);
-    let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
+    let judgement = judge_for(LookFor::Plan, &film, &settings(), 1.0).expect("judges");
     // 1.3 % of 4,000 cd/m², less for sixteen samples without it: 43 cd/m² on 1.
     let displayed = (judgement.pooled_variance_per_sample.get(33, 32) / 16.0).sqrt();
     assert!((20.0..80.0).contains(&displayed), "{displayed} cd/m²");
@@ -169,7 +169,7 @@ fn a_rim_that_was_lucky_is_not_done() {
         };
         let film = film_of_lamps(|pixel, random| Vec3::splat(radiance(pixel, random)), |pixel| pixel % 64 <= 32);
         let lucky_halves = Half::BOTH.map(|half| film.half(half)[place as usize].mean[0] > 1.0);
-        let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
+        let judgement = judge_for(LookFor::Plan, &film, &settings(), 1.0).expect("judges");
         (lucky_halves, judgement.pooled_variance_per_sample.values()[place as usize])
     };
     let (none, unmet) = noise_beside_a_lamp(2.0);
@@ -203,7 +203,7 @@ fn light_beyond_all_numbers_is_seen() {
     let film = film_of(|pixel, random| Vec3::splat(if pixel < 64 { 1e12 * (1.0 + random) } else { 1.0 }));
     for unit in [1e12, 1e15, 1e20] {
         let extreme = LoopSettings { nits_per_unit: unit, ..settings() };
-        let judgement = judge_to_plan(&film, &extreme, 1.0).expect("judges");
+        let judgement = judge_for(LookFor::Plan, &film, &extreme, 1.0).expect("judges");
         assert!(!is_reached(&judgement, 1.0), "{unit:e}: {}", judgement.predicted.mean());
         assert!(judgement.predicted.values().iter().all(|v| !v.is_nan()), "{unit:e}");
     }
@@ -224,7 +224,7 @@ fn noise_of_alpha_is_seen_over_white() {
     assert_eq!(opaque.predicted.quantile(1.0), 0.0);
     for denoiser in [None, Some(Denoiser::Builtin)] {
         let transparent = LoopSettings { is_transparent: true, denoiser, ..settings() };
-        let judgement = judge_to_plan(&film, &transparent, 1.0).expect("judges");
+        let judgement = judge_for(LookFor::Plan, &film, &transparent, 1.0).expect("judges");
         let [predicted, measured] = [&judgement.predicted, &judgement.measured_error().visibility]
             .map(|visibility| f64::from(visibility.get(32, 32)));
         assert!(predicted > 2.0, "{predicted} at the border");
