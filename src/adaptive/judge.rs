@@ -373,13 +373,13 @@ pub(super) fn half_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Pla
 /// The denoised picture, cd/m²: what adaptation, masking and the operator are made from, so that noise neither
 /// masks itself nor raises its own adaptation. Never output.
 pub(crate) fn guide_rgb(film: &Film, estimate: &Estimate) -> Vec<[f32; 3]> {
-    let albedo: Vec<_> = film.guides().iter().map(|guide| guide.albedo).collect();
+    let albedo: Vec<_> = film.features().iter().map(|guide| guide.albedo).collect();
     without_noise(film, &estimate.rgb_cd_m2, &estimate.variance_of_mean, &albedo)
 }
 
 /// A picture of what the film's first surfaces show, without its noise. `albedo`: what to divide by before.
 fn without_noise(film: &Film, rgb: &[[f32; 3]], variance: &Plane, albedo: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    let guides = film.guides();
+    let guides = film.features();
     denoise(&GuideInputs {
         rgb,
         variance,

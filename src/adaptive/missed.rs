@@ -99,7 +99,7 @@ pub(super) struct LampEdges<'a> {
 impl LampEdges<'_> {
     /// Luminance of lamps, cd/m², that is expected in each pixel beyond what its samples have found.
     pub(super) fn missed(&self) -> Plane {
-        self.missed_where(|pixel| !self.film.guides()[pixel].seen.shines())
+        self.missed_where(|pixel| !self.film.features()[pixel].object.shines())
     }
 
     /// Luminance of lamps, cd/m², that is expected in each pixel beside what its samples have found, whether they have
@@ -118,7 +118,7 @@ impl LampEdges<'_> {
             rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
         };
         let light = |(x, y): (usize, usize)| mean_cd_m2.get(x, y);
-        let shines = |(x, y): (usize, usize)| self.film.guides()[y * width + x].seen.shines();
+        let shines = |(x, y): (usize, usize)| self.film.features()[y * width + x].object.shines();
         let is_lamp = |at: (usize, usize)| shines(at) && light(at) > self.lamps_from_cd_m2;
         let mut missed = Plane::filled(width, height, 0.0);
         for lamp in (0..width * height).map(|pixel| (pixel % width, pixel / width)).filter(|&at| is_lamp(at)) {

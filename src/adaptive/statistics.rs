@@ -87,7 +87,7 @@ impl SampleStatistics {
             .with_min_len(PIXELS_PER_TASK)
             .map(|i| refined(i, PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i]))))
             .collect();
-        let surfaces = PixelSurfaces { guides: film.guides(), known_things: film.known_things.as_ref() };
+        let surfaces = PixelSurfaces { features: film.features(), known_things: film.known_things.as_ref() };
         let pooled = pooled_by_neighbours(&evidence, &surfaces, width);
         let channels = pooled.map(|Pooled { variance, factor, factor_with_own }| ChannelStatistics {
             pooled: variance,

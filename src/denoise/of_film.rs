@@ -4,7 +4,7 @@
 //! half's own to each half: beside light that is a hundred times as strong a denoiser draws halos.
 
 use super::{Denoiser, NoisyPicture, OidnError, SurfaceGuides};
-use crate::film::{Estimate, Film, HalfPixel, Halves, PixelGuide};
+use crate::film::{Estimate, Film, HalfPixel, Halves, PixelFeatures};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::photometry::luminance;
@@ -29,13 +29,13 @@ pub struct DenoisedFilm {
 pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Result<DenoisedFilm, OidnError> {
     let (width, height) = (film.width() as usize, film.height() as usize);
     let estimate = film.estimate(nits_per_unit);
-    let most = most_of_lamps(film.guides(), &estimate.rgb_cd_m2);
+    let most = most_of_lamps(film.features(), &estimate.rgb_cd_m2);
     let denoised = |rgb: &[[f32; 3]], variance: &Plane, guides: SurfaceGuides| {
         let guides = denoiser.prepare(guides)?;
-        let of_lamp = |(guide, &rgb): (&PixelGuide, &[f32; 3])| {
-            if guide.seen.shines() { excess(rgb.into(), most) } else { Vec3::ZERO }
+        let of_lamp = |(guide, &rgb): (&PixelFeatures, &[f32; 3])| {
+            if guide.object.shines() { excess(rgb.into(), most) } else { Vec3::ZERO }
         };
-        let lamps: Vec<Vec3> = film.guides().iter().zip(rgb).map(of_lamp).collect();
+        let lamps: Vec<Vec3> = film.features().iter().zip(rgb).map(of_lamp).collect();
         let rest: Vec<[f32; 3]> = rgb.iter().zip(&lamps).map(|(&rgb, &lamp)| (Vec3::from(rgb) - lamp).into()).collect();
         let mut denoised = denoiser.denoise(&NoisyPicture { rgb: &rest, variance, guides: &guides })?;
         denoised.iter_mut().zip(lamps).for_each(|(rgb, lamp)| *rgb = (Vec3::from(*rgb) + lamp).into());
@@ -47,10 +47,11 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
         let pixels = 0..width * height;
         let rgb: Vec<[f32; 3]> =
             pixels.map(|pixel| mean_cd_m2(film.halves(pixel).half_or_other(half), nits_per_unit)).collect();
-        let guides = surface_guides(film, 0.5, |pixel| film.guide_of_half(half, pixel));
+        let guides = surface_guides(film, 0.5, |pixel| film.features_of_half(half, pixel));
         denoised(&rgb, &variance.map(|variance| 2.0 * variance), guides)
     };
-    let rgb_cd_m2 = denoised(&estimate.rgb_cd_m2, &variance, surface_guides(film, 1.0, |pixel| film.guides()[pixel]))?;
+    let rgb_cd_m2 =
+        denoised(&estimate.rgb_cd_m2, &variance, surface_guides(film, 1.0, |pixel| film.features()[pixel]))?;
     // Without both halves each is the picture.
     let halves_rgb_cd_m2 = match film.has_both_halves() {
         true => [of_half(Half::A)?, of_half(Half::B)?],
@@ -79,8 +80,8 @@ fn told_variance(film: &Film, estimate: &Estimate) -> Plane {
 }
 
 /// What this share of the samples have met.
-fn surface_guides(film: &Film, share: f64, at: impl Fn(usize) -> PixelGuide) -> SurfaceGuides {
-    let guides: Vec<PixelGuide> = (0..film.guides().len()).map(at).collect();
+fn surface_guides(film: &Film, share: f64, at: impl Fn(usize) -> PixelFeatures) -> SurfaceGuides {
+    let guides: Vec<PixelFeatures> = (0..film.features().len()).map(at).collect();
     let samples_of_picture = film.total_samples() as f64 / guides.len().max(1) as f64;
     SurfaceGuides {
         width: film.width() as usize,
@@ -88,7 +89,7 @@ fn surface_guides(film: &Film, share: f64, at: impl Fn(usize) -> PixelGuide) -> 
         albedo: guides.iter().map(|guide| guide.albedo).collect(),
         normal: guides.iter().map(|guide| guide.normal).collect(),
         depth: guides.iter().map(|guide| guide.depth).collect(),
-        shines: guides.iter().map(|guide| guide.seen.shines()).collect(),
+        shines: guides.iter().map(|guide| guide.object.shines()).collect(),
         samples: share * samples_of_picture,
         samples_of_picture,
     }
@@ -107,8 +108,8 @@ pub fn leave_the_void_dark(film: &Film, rgb: &mut [[f32; 3]]) {
 const TIMES_THE_REST: f32 = 10.0;
 
 /// The most luminance that the denoiser is shown of what shines by itself, cd/m².
-fn most_of_lamps(guides: &[PixelGuide], rgb_cd_m2: &[[f32; 3]]) -> f32 {
-    let rest = || guides.iter().zip(rgb_cd_m2).filter(|(guide, _)| !guide.seen.shines());
+fn most_of_lamps(guides: &[PixelFeatures], rgb_cd_m2: &[[f32; 3]]) -> f32 {
+    let rest = || guides.iter().zip(rgb_cd_m2).filter(|(guide, _)| !guide.object.shines());
     let sum: f64 = rest().map(|(_, &rgb)| f64::from(luminance(rgb))).sum();
     match rest().count() {
         0 => f32::INFINITY,

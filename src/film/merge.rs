@@ -1,7 +1,7 @@
 //! Adds films of the same picture, and checks one that was in a file. Whether they are of one scene is left to
 //! `checkpoint`.
 
-use super::{Film, HalfPixel, Moments, PixelGuide};
+use super::{Film, HalfPixel, Moments, PixelFeatures};
 use crate::sampler::Half;
 use fechner_perception::PIXELS_PER_TASK;
 use rayon::prelude::*;
@@ -31,12 +31,12 @@ impl Film {
         }
         let [a, b] = &mut self.halves;
         let [other_a, other_b] = &other.halves;
-        let pixels = (&mut self.guides, &mut self.guides_of_a, a, b).into_par_iter();
-        let others = (&other.guides, &other.guides_of_a, other_a, other_b).into_par_iter();
+        let pixels = (&mut self.features, &mut self.features_of_a, a, b).into_par_iter();
+        let others = (&other.features, &other.features_of_a, other_a, other_b).into_par_iter();
         pixels.zip(others).with_min_len(PIXELS_PER_TASK).for_each(
-            |((guide, guide_of_a, a, b), (other_guide, other_guide_of_a, other_a, other_b))| {
-                guide.add(other_guide, a.samples + b.samples, other_a.samples + other_b.samples);
-                guide_of_a.add(other_guide_of_a, a.samples, other_a.samples);
+            |((features, features_of_a, a, b), (other_features, other_features_of_a, other_a, other_b))| {
+                features.add(other_features, a.samples + b.samples, other_a.samples + other_b.samples);
+                features_of_a.add(other_features_of_a, a.samples, other_a.samples);
                 a.combine(&Moments::of_half(other_a));
                 b.combine(&Moments::of_half(other_b));
             },
@@ -49,8 +49,9 @@ impl Film {
     /// This film with its halves in each other's place.
     #[must_use]
     pub fn with_halves_swapped(mut self) -> Self {
-        let of_b: Vec<PixelGuide> = (0..self.guides.len()).map(|pixel| self.guide_of_half(Half::B, pixel)).collect();
-        self.guides_of_a = of_b;
+        let of_b: Vec<PixelFeatures> =
+            (0..self.features.len()).map(|pixel| self.features_of_half(Half::B, pixel)).collect();
+        self.features_of_a = of_b;
         self.halves.swap(0, 1);
         self
     }
@@ -70,7 +71,7 @@ impl Film {
         if pixels == 0 || pixels > u64::from(Self::MAX_PIXELS) {
             return Err("its size makes no sense");
         }
-        let lengths = [self.halves[0].len(), self.halves[1].len(), self.guides.len(), self.guides_of_a.len()];
+        let lengths = [self.halves[0].len(), self.halves[1].len(), self.features.len(), self.features_of_a.len()];
         if lengths.iter().any(|&length| length as u64 != pixels) {
             return Err("its pixels are not as many as its size says");
         }
@@ -81,12 +82,12 @@ impl Film {
                 && pixel.mean.iter().all(|mean| mean.is_finite())
                 && pixel.m2.iter().all(|m2| m2.is_finite() && *m2 >= 0.0)
         };
-        let is_sound_guide = |guide: &PixelGuide| {
+        let are_sound_features = |features: &PixelFeatures| {
             let finite = |values: &[f32; 3]| values.iter().all(|value| value.is_finite());
-            finite(&guide.albedo) && finite(&guide.normal) && !guide.depth.is_nan()
+            finite(&features.albedo) && finite(&features.normal) && !features.depth.is_nan()
         };
         if !self.halves.iter().flatten().all(is_sound)
-            || !self.guides.iter().chain(&self.guides_of_a).all(is_sound_guide)
+            || !self.features.iter().chain(&self.features_of_a).all(are_sound_features)
         {
             return Err("a pixel holds what no samples can sum up to");
         }
@@ -123,7 +124,7 @@ mod tests {
         film
     }
 
-    /// The sum of two films has the counts, means, variances and guides of all their samples together.
+    /// The sum of two films has the counts, means, variances and features of all their samples together.
     #[test]
     fn sums_add() {
         let values: Vec<f32> = (0..40).map(|i| ((i * 29) % 40) as f32 * 0.1 + 0.3).collect();
@@ -150,9 +151,9 @@ mod tests {
             assert!((pixel.sample_variance(0) / variance - 1.0).abs() < 1e-6);
         }
         let mean = values.iter().sum::<f32>() / 40.0;
-        let guide = sum.guides()[0];
-        assert!((guide.depth - mean).abs() < 1e-5 && (guide.albedo[2] - mean).abs() < 1e-5);
-        assert_eq!((guide.seen.object_id(), guide.seen.shines(), sum.rays), (7, true, 120));
+        let features = sum.features()[0];
+        assert!((features.depth - mean).abs() < 1e-5 && (features.albedo[2] - mean).abs() < 1e-5);
+        assert_eq!((features.object.id(), features.object.shines(), sum.rays), (7, true, 120));
     }
 
     #[test]
@@ -192,9 +193,9 @@ mod tests {
         assert!(changed(&|film| film.halves[0][0].samples = 9));
         assert!(changed(&|film| film.halves[1][0].missed = 2), "alpha would be below 0");
         assert!(changed(&|film| film.halves[0][0].taken = u32::MAX));
-        assert!(changed(&|film| film.guides[0].albedo[0] = f32::INFINITY));
-        assert!(changed(&|film| film.guides.clear()));
-        assert!(changed(&|film| film.guides_of_a[0].normal[1] = f32::NAN));
-        assert!(changed(&|film| film.guides_of_a.clear()));
+        assert!(changed(&|film| film.features[0].albedo[0] = f32::INFINITY));
+        assert!(changed(&|film| film.features.clear()));
+        assert!(changed(&|film| film.features_of_a[0].normal[1] = f32::NAN));
+        assert!(changed(&|film| film.features_of_a.clear()));
     }
 }

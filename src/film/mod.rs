@@ -5,7 +5,7 @@
 
 mod block_sum;
 mod estimate;
-mod guide;
+mod features;
 mod halves;
 mod known_things;
 mod merge;
@@ -15,7 +15,7 @@ mod over;
 
 pub use block_sum::BlockSum;
 pub use estimate::Estimate;
-pub use guide::{PixelGuide, Seen};
+pub use features::{ObjectFlags, PixelFeatures};
 pub use halves::{Halves, share_of_mean};
 pub use known_things::KnownThings;
 #[cfg(test)]
@@ -130,9 +130,9 @@ pub struct Film {
     height: u32,
     halves: [Vec<HalfPixel>; 2],
     /// Guides of all samples.
-    guides: Vec<PixelGuide>,
+    features: Vec<PixelFeatures>,
     /// Guides of the first half's samples. The other's are what is left.
-    guides_of_a: Vec<PixelGuide>,
+    features_of_a: Vec<PixelFeatures>,
     /// Samples that were not finite.
     pub nonfinite_samples: u64,
     /// Rays traced.
@@ -151,8 +151,8 @@ impl Film {
             width,
             height,
             halves: [vec![HalfPixel::default(); pixels], vec![HalfPixel::default(); pixels]],
-            guides: vec![PixelGuide::default(); pixels],
-            guides_of_a: vec![PixelGuide::default(); pixels],
+            features: vec![PixelFeatures::default(); pixels],
+            features_of_a: vec![PixelFeatures::default(); pixels],
             nonfinite_samples: 0,
             rays: 0,
             known_things: None,
@@ -171,7 +171,7 @@ impl Film {
 
     /// Number of the film's pixels.
     pub fn pixel_count(&self) -> usize {
-        self.guides.len()
+        self.features.len()
     }
 
     /// A value of each pixel, asked for by its number, rows in parallel.
@@ -191,14 +191,14 @@ impl Film {
     }
 
     /// First surfaces, row-major.
-    pub fn guides(&self) -> &[PixelGuide] {
-        &self.guides
+    pub fn features(&self) -> &[PixelFeatures] {
+        &self.features
     }
 
     /// First surface of a pixel as the samples of one half have seen it; of both where one half has no samples.
-    pub fn guide_of_half(&self, half: Half, pixel: usize) -> PixelGuide {
+    pub fn features_of_half(&self, half: Half, pixel: usize) -> PixelFeatures {
         let [a, b] = Half::BOTH.map(|half| self.half(half)[pixel].samples);
-        let (whole, of_a) = (&self.guides[pixel], &self.guides_of_a[pixel]);
+        let (whole, of_a) = (&self.features[pixel], &self.features_of_a[pixel]);
         match half {
             _ if a == 0 || b == 0 => *whole,
             Half::A => *of_a,
@@ -213,9 +213,9 @@ impl Film {
         self.halves[work.half.index()][pixel].merge(block);
         self.nonfinite_samples += u64::from(block.nonfinite);
         self.rays += block.rays;
-        self.guides[pixel].add_block(block, before[0] + before[1]);
+        self.features[pixel].add_block(block, before[0] + before[1]);
         if work.half == Half::A {
-            self.guides_of_a[pixel].add_block(block, before[0]);
+            self.features_of_a[pixel].add_block(block, before[0]);
         }
     }
 
@@ -228,7 +228,7 @@ impl Film {
     /// Share of each pixel that something covers, weighed as the picture is: the mean of the halves.
     pub fn coverage(&self) -> Vec<f32> {
         let of = |half: &HalfPixel| f64::from(half.coverage());
-        (0..self.guides.len()).map(|pixel| self.halves(pixel).mean(of) as f32).collect()
+        (0..self.features.len()).map(|pixel| self.halves(pixel).mean(of) as f32).collect()
     }
 
     /// Whether no sample of a pixel met anything or brought any light: there is nothing in it.
@@ -336,7 +336,7 @@ mod tests {
     /// Each half knows what its own samples have met, after blocks in any order; a surface at infinity leaves no number
     /// that is none.
     #[test]
-    fn halves_have_guides_of_their_own() {
+    fn halves_have_features_of_their_own() {
         let sum = |albedo: f32, depth: f32, samples: u32| {
             let mut sum = BlockSum::default();
             for _ in 0..samples {
@@ -350,14 +350,14 @@ mod tests {
             film.merge_block(BlockWork { half, ..BlockWork::whole(0, half, level) }, sum);
         };
         add(&mut film, Half::B, 0, &sum(0.25, 2.0, 2));
-        assert_eq!(film.guide_of_half(Half::A, 0), film.guides()[0], "a half without samples has the other's");
+        assert_eq!(film.features_of_half(Half::A, 0), film.features()[0], "a half without samples has the other's");
         add(&mut film, Half::A, 0, &sum(1.0, 4.0, 2));
         add(&mut film, Half::B, 1, &sum(0.75, 3.0, 6));
-        let [a, b] = Half::BOTH.map(|half| film.guide_of_half(half, 0));
+        let [a, b] = Half::BOTH.map(|half| film.features_of_half(half, 0));
         assert_eq!((a.albedo[0], a.depth), (1.0, 4.0));
         assert!((b.albedo[0] - 0.625).abs() < 1e-6 && (b.depth - 2.75).abs() < 1e-6, "{b:?}");
         add(&mut film, Half::A, 1, &sum(1.0, f32::INFINITY, 2));
-        assert_eq!(film.guide_of_half(Half::B, 0).depth, f32::INFINITY, "where the whole is infinite");
+        assert_eq!(film.features_of_half(Half::B, 0).depth, f32::INFINITY, "where the whole is infinite");
     }
 
     /// Squares of light that is far above all others' are beyond f32: what the film keeps of them can still
@@ -382,6 +382,6 @@ mod tests {
 
     #[test]
     fn a_pixel_takes_at_most_160_bytes() {
-        assert!(2 * size_of::<HalfPixel>() + 2 * size_of::<PixelGuide>() <= 160);
+        assert!(2 * size_of::<HalfPixel>() + 2 * size_of::<PixelFeatures>() <= 160);
     }
 }

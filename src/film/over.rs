@@ -13,7 +13,7 @@ impl Film {
         let over = |half: &Vec<HalfPixel>| -> Vec<HalfPixel> {
             half.iter().zip(scale).map(|(pixel, &scale)| pixel.over_ground(f64::from(scale), ground_cd_m2)).collect()
         };
-        assert!(scale.len() >= self.guides.len(), "a scale for each pixel");
+        assert!(scale.len() >= self.features.len(), "a scale for each pixel");
         Self { halves: self.halves.each_ref().map(over), ..self.clone() }
     }
 }

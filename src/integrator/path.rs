@@ -13,7 +13,7 @@ use crate::sampler::Sample;
 use fechner_perception::photometry::luminance;
 use glam::{Vec3, Vec3A};
 
-/// What the first surface looks like: guides for the perception model and for denoisers.
+/// What the first surface looks like: features for the perception model and for denoisers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstHit {
     /// Directional albedo in [0, 1]; 1 where the surface emits.

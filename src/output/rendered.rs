@@ -7,7 +7,7 @@ use super::{
 use crate::adaptive::Rendered;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
-use crate::film::{Film, PixelGuide};
+use crate::film::{Film, PixelFeatures};
 use crate::sampler::Half;
 use fechner_perception::display::Display;
 use fechner_perception::tone::map_picture;
@@ -102,7 +102,7 @@ pub fn layers<'a>(
     if background == Background::Transparent {
         picture.push_f32(channel::ALPHA, film.coverage());
     }
-    let guide = |value: &dyn Fn(&PixelGuide) -> f32| film.guides().iter().map(value).collect::<Vec<f32>>();
+    let guide = |value: &dyn Fn(&PixelFeatures) -> f32| film.features().iter().map(value).collect::<Vec<f32>>();
     for (c, name) in channel::ALBEDO.into_iter().enumerate() {
         picture.push_f16(name, guide(&|g| g.albedo[c]));
     }
@@ -110,7 +110,7 @@ pub fn layers<'a>(
         picture.push_f16(name, guide(&|g| g.normal[c]));
     }
     picture.push_f32(channel::DEPTH, guide(&|g| g.depth));
-    picture.push_u32(channel::OBJECT_ID, film.guides().iter().map(|g| g.seen.object_id()).collect::<Vec<u32>>());
+    picture.push_u32(channel::OBJECT_ID, film.features().iter().map(|g| g.object.id()).collect::<Vec<u32>>());
     picture.push_u32(channel::SAMPLES, sample_counts(film));
     let variance = picture_variance(film, nits_per_unit);
     picture.push_f32(channel::VARIANCE, variance.into_values());

@@ -1,7 +1,7 @@
 //! What a viewer can look at. How they are encoded is left to `frame`.
 
 use super::coarse::stand_in;
-use crate::film::{Film, PixelGuide};
+use crate::film::{Film, PixelFeatures};
 use crate::output::encode_srgb8;
 use crate::output::false_colour::{Colours, Range, figure, range, share_of};
 use fechner_perception::Plane;
@@ -111,8 +111,8 @@ pub(super) fn unknown(film: &Film, why: &str) -> Colours {
 }
 
 /// First surfaces; where a pixel has no samples yet, another's.
-fn surfaces(film: &Film) -> impl Iterator<Item = &PixelGuide> {
-    (0..film.guides().len()).map(|pixel| &film.guides()[stand_in(film, pixel).unwrap_or(pixel)])
+fn surfaces(film: &Film) -> impl Iterator<Item = &PixelFeatures> {
+    (0..film.features().len()).map(|pixel| &film.features()[stand_in(film, pixel).unwrap_or(pixel)])
 }
 
 /// A plain picture in place of a layer that needs a look at the film which has not been taken.

@@ -9,7 +9,7 @@ mod tests;
 
 use super::spectator::{Shown, Spectator, Stage};
 use crate::adaptive::statistics::picture_variance;
-use crate::film::{Film, PixelGuide};
+use crate::film::{Film, PixelFeatures};
 use crate::output::channel;
 use crate::poison::Unpoisoned as _;
 use packet::Layer;
@@ -187,7 +187,7 @@ fn message(shown: &Shown<'_>) -> Message {
     let Shown { film, rgb_cd_m2, looked, nits_per_unit, .. } = *shown;
     let to_units = (1.0 / nits_per_unit) as f32;
     let picture = |c: usize| rgb_cd_m2.iter().map(move |rgb| rgb[c] * to_units);
-    let guide = |of: fn(&PixelGuide) -> f32| film.guides().iter().map(of);
+    let guide = |of: fn(&PixelFeatures) -> f32| film.features().iter().map(of);
     let layer = |names: &[&'static str], values: Vec<f32>| Layer { names: names.to_vec(), values };
     let mut layers = vec![
         layer(&channel::RGB, (0..3).flat_map(picture).collect()),

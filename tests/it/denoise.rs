@@ -147,7 +147,7 @@ fn lamps_are_known() {
     let tracer = PathTracer::new(scene, trace_settings(48, 48, 1));
     let mut film = Film::new(48, 48);
     fechner::benchmark::trace_up_to(&tracer, &mut film, 8);
-    let pixels = || (0..48 * 48).map(|pixel| (film.guides()[pixel].seen.shines(), film.rgb_cd_m2(pixel, 1.0)[1]));
+    let pixels = || (0..48 * 48).map(|pixel| (film.features()[pixel].object.shines(), film.rgb_cd_m2(pixel, 1.0)[1]));
     let brightest = pixels().fold((false, 0.0), |most: (bool, f32), pixel| if pixel.1 > most.1 { pixel } else { most });
     assert!(brightest.0, "the lamp: {brightest:?}");
     let others = pixels().filter(|&(shines, value)| !shines && value > 0.0).count();

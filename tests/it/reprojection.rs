@@ -53,7 +53,7 @@ fn film_of(tracer: &PathTracer) -> Film {
 
 /// Whether all of a pixel's neighbours show the same patch, so that what is beside it in the next frame is that patch too.
 fn is_inside(film: &Film, x: u32, y: u32) -> bool {
-    let albedo = |x: u32, y: u32| film.guides()[(y * WIDTH + x) as usize].albedo[0];
+    let albedo = |x: u32, y: u32| film.features()[(y * WIDTH + x) as usize].albedo[0];
     let own = albedo(x, y);
     (y - 2..=y + 2).all(|row| (x - 2..=x + 2).all(|column| (albedo(column, row) - own).abs() < 1e-4))
 }

@@ -3,7 +3,7 @@
 //! In planes, [`LANES`] columns at a time, whose sums stay in registers and in the first cache.
 
 use super::PixelEvidence;
-use crate::film::{CHANNELS, KnownThings, PixelGuide};
+use crate::film::{CHANNELS, KnownThings, PixelFeatures};
 use fechner_perception::Plane;
 use glam::Vec4;
 use rayon::prelude::*;
@@ -120,7 +120,7 @@ const NOWHERE: f32 = 1e20;
 /// What pixels see first.
 pub(super) struct PixelSurfaces<'a> {
     /// Guide of each pixel.
-    pub(super) guides: &'a [PixelGuide],
+    pub(super) features: &'a [PixelFeatures],
     /// Small things of which few of these samples tell.
     pub(super) known_things: Option<&'a KnownThings>,
 }
@@ -135,7 +135,7 @@ impl PixelSurfaces<'_> {
     fn as_neighbour(&self, pixel: usize) -> AsNeighbour {
         /// How far: such a pixel weighs nothing beside others, however strong its noise.
         const APART: f32 = 1e10;
-        let mut looks = looks(&self.guides[pixel]);
+        let mut looks = looks(&self.features[pixel]);
         let share = self.known_things.map_or(0.0, |things| things.share(pixel));
         if share == 0.0 {
             // Never 0, so that a lone pixel still learns something.
@@ -151,7 +151,7 @@ impl PixelSurfaces<'_> {
 }
 
 /// What a surface looks like. Half weight at: normals 25° apart, albedo 0.1 apart, depth 5 % apart.
-fn looks(guide: &PixelGuide) -> [f32; LOOK_FACTS] {
+fn looks(guide: &PixelFeatures) -> [f32; LOOK_FACTS] {
     let [nx, ny, nz] = guide.normal.map(|part| 2.3 * part);
     let [red, green, blue] = guide.albedo.map(|band| 10.0 * band);
     // Nothing has been hit at depth 0.
@@ -315,7 +315,7 @@ impl ChannelSums {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Seen;
+    use crate::film::ObjectFlags;
     use crate::sampler::{hash_words, unit_f64_of_hash};
 
     /// Of three tiles in a row.
@@ -325,7 +325,7 @@ mod tests {
         unit_f64_of_hash(hash_words(pixel as u64, what))
     }
 
-    fn picture() -> (Vec<[PixelEvidence; CHANNELS]>, Vec<PixelGuide>) {
+    fn picture() -> (Vec<[PixelEvidence; CHANNELS]>, Vec<PixelFeatures>) {
         let evidence = |pixel: usize| {
             std::array::from_fn(|c| PixelEvidence {
                 variance: random(pixel, c as u64),
@@ -333,36 +333,36 @@ mod tests {
                 expected_difference: random(pixel, 20 + c as u64),
             })
         };
-        let guide = |pixel: usize| PixelGuide {
+        let guide = |pixel: usize| PixelFeatures {
             albedo: std::array::from_fn(|band| (0.3 * random(pixel, 30 + band as u64)) as f32),
             normal: std::array::from_fn(|axis| random(pixel, 40 + axis as u64) as f32),
             depth: 2.0 + 0.2 * random(pixel, 50) as f32,
-            seen: Seen::default(),
+            object: ObjectFlags::default(),
         };
         let pixels = SIZE[0] * SIZE[1];
         ((0..pixels).map(evidence).collect(), (0..pixels).map(guide).collect())
     }
 
-    fn surfaces(guides: &[PixelGuide]) -> PixelSurfaces<'_> {
-        PixelSurfaces { guides, known_things: None }
+    fn surfaces(features: &[PixelFeatures]) -> PixelSurfaces<'_> {
+        PixelSurfaces { features, known_things: None }
     }
 
     /// A lamp in the middle of an even sky scatters, which is not the noise of the sky beside it.
     #[test]
     fn what_has_no_lamp_has_not_its_noise() {
-        let mut guides = picture().1;
-        guides.fill(PixelGuide { albedo: [1.0; 3], ..PixelGuide::default() });
+        let mut features = picture().1;
+        features.fill(PixelFeatures { albedo: [1.0; 3], ..PixelFeatures::default() });
         let lamp = 3 * SIZE[0] + 20;
-        let evidence: Vec<[PixelEvidence; CHANNELS]> = (0..guides.len())
+        let evidence: Vec<[PixelEvidence; CHANNELS]> = (0..features.len())
             .map(|pixel| {
                 let variance = if pixel == lamp { 4.8e9 } else { 1.0 };
                 [PixelEvidence { variance, squared_difference: 1.0, expected_difference: 1.0 }; CHANNELS]
             })
             .collect();
-        let mut lamps = KnownThings::new(guides.len());
+        let mut lamps = KnownThings::new(features.len());
         lamps.add(lamp, 0.1, 1.0, true);
         let beside = |known_things: Option<&KnownThings>| {
-            let surfaces = PixelSurfaces { guides: &guides, known_things };
+            let surfaces = PixelSurfaces { features: &features, known_things };
             pooled_by_neighbours(&evidence, &surfaces, SIZE[0])[0].variance.values()[lamp + 1]
         };
         let (unknown, known) = (beside(None), beside(Some(&lamps)));
@@ -374,7 +374,7 @@ mod tests {
         pixel: usize,
         channel: usize,
         evidence: &[[PixelEvidence; CHANNELS]],
-        guides: &[PixelGuide],
+        features: &[PixelFeatures],
     ) -> [f64; 3] {
         let at = |pixel: usize| [pixel % SIZE[0], pixel / SIZE[0]];
         let neighbours = (0..evidence.len()).filter(|&other| {
@@ -382,7 +382,7 @@ mod tests {
         });
         let (mut weights, mut variance, mut squared, mut expected, mut most) = (0.0, 0.0, 0.0, 0.0, 0.0_f64);
         for other in neighbours {
-            let (p, q) = (&guides[pixel], &guides[other]);
+            let (p, q) = (&features[pixel], &features[other]);
             let square =
                 |p: [f32; 3], q: [f32; 3]| -> f64 { p.iter().zip(q).map(|(a, b)| f64::from(a - b).powi(2)).sum() };
             let depth = f64::from(p.depth / q.depth).ln();
@@ -404,14 +404,14 @@ mod tests {
     /// By rows and in planes comes out what the definition says, at borders too.
     #[test]
     fn rows_pool_what_pixels_would() {
-        let (evidence, guides) = picture();
-        let pooled = pooled_by_neighbours(&evidence, &surfaces(&guides), SIZE[0]);
+        let (evidence, features) = picture();
+        let pooled = pooled_by_neighbours(&evidence, &surfaces(&features), SIZE[0]);
         for (channel, pooled) in pooled.iter().enumerate() {
             let planes = [&pooled.variance, &pooled.factor, &pooled.factor_with_own];
             assert!(planes.iter().all(|plane| plane.values().len() == evidence.len()));
             for pixel in 0..evidence.len() {
                 let found = planes.map(|plane| plane.values()[pixel]);
-                let expected = expected(pixel, channel, &evidence, &guides);
+                let expected = expected(pixel, channel, &evidence, &features);
                 for (found, expected) in found.into_iter().zip(expected) {
                     let error = (f64::from(found) / expected - 1.0).abs();
                     assert!(error < 1e-5, "pixel {pixel}, channel {channel}: {found} for {expected}");
@@ -437,8 +437,8 @@ mod tests {
 
     #[test]
     fn a_lone_pixel_goes_by_itself() {
-        let (evidence, guides) = picture();
-        let pooled = pooled_by_neighbours(&evidence[..1], &surfaces(&guides[..1]), 1);
+        let (evidence, features) = picture();
+        let pooled = pooled_by_neighbours(&evidence[..1], &surfaces(&features[..1]), 1);
         assert_eq!(pooled[1].variance.values(), [evidence[0][1].variance as f32]);
     }
 }

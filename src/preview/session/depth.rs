@@ -33,7 +33,7 @@ impl Session<'_> {
         let in_film = |(film, step): (&Film, usize)| {
             let (column, row, width) = (x / step, y / step, film.width() as usize);
             let pixel = row.checked_mul(width)?.checked_add(column).filter(|_| column < width)?;
-            film.guides().get(pixel).map(|guide| guide.depth).filter(|depth| depth.is_normal())
+            film.features().get(pixel).map(|guide| guide.depth).filter(|depth| depth.is_normal())
         };
         self.films().find_map(in_film).map(|depth| depth * self.cosine_at(x, y))
     }
@@ -41,7 +41,7 @@ impl Session<'_> {
     /// The middle one of such distances, over all pixels that show something.
     fn median_depth(&self) -> Option<f32> {
         let in_film = |(film, step): (&Film, usize)| {
-            let (width, guides) = (film.width() as usize, film.guides());
+            let (width, guides) = (film.width() as usize, film.features());
             let asked = (0..guides.len()).step_by(guides.len() / ASKED_PIXELS + 1);
             let seen = asked.filter(|&pixel| guides[pixel].depth.is_normal());
             let along_axis = |pixel: usize| {

@@ -6,25 +6,25 @@ use serde::{Deserialize, Serialize};
 
 /// Mean of what the first surfaces of a pixel are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PixelGuide {
+pub struct PixelFeatures {
     /// Mean albedo.
     pub albedo: [f32; 3],
     /// Mean shading normal, not unit length at edges.
     pub normal: [f32; 3],
     /// Mean distance from the camera, scene units; samples that met nothing count as 0.
     pub depth: f32,
-    /// What is there.
-    pub seen: Seen,
+    /// Which object its first sample met, and whether anything shines there.
+    pub object: ObjectFlags,
 }
 
-impl PixelGuide {
+impl PixelFeatures {
     /// Adds a block to what `before` samples have seen.
     pub(super) fn add_block(&mut self, block: &BlockSum, before: u32) {
         if let (0, Some(id)) = (before, block.first_object_id) {
-            self.seen = self.seen.with_object(id);
+            self.object = self.object.with_object(id);
         }
         if block.shines {
-            self.seen = self.seen.shining();
+            self.object = self.object.shining();
         }
         if block.samples > 0 {
             let share = block.samples as f32 / (before + block.samples) as f32;
@@ -38,8 +38,8 @@ impl PixelGuide {
         }
     }
 
-    /// Blends in another guide by the samples that both stand for.
-    pub(super) fn add(&mut self, other: &PixelGuide, own_samples: u32, other_samples: u32) {
+    /// Blends in the features of other samples by the samples that both stand for.
+    pub(super) fn add(&mut self, other: &PixelFeatures, own_samples: u32, other_samples: u32) {
         if own_samples == 0 {
             *self = *other;
         } else if other_samples > 0 {
@@ -48,8 +48,8 @@ impl PixelGuide {
             self.albedo.iter_mut().zip(other.albedo).for_each(|(old, new)| blend(old, new));
             self.normal.iter_mut().zip(other.normal).for_each(|(old, new)| blend(old, new));
             blend(&mut self.depth, other.depth);
-            if other.seen.shines() {
-                self.seen = self.seen.shining();
+            if other.object.shines() {
+                self.object = self.object.shining();
             }
         }
     }
@@ -65,19 +65,24 @@ impl PixelGuide {
         let albedo: [f32; 3] = lefts(self.albedo, part.albedo);
         // Rounding must not make the albedo of black less than that.
         let albedo = albedo.map(|albedo| albedo.max(0.0));
-        Self { albedo, normal: lefts(self.normal, part.normal), depth: left(self.depth, part.depth), seen: self.seen }
+        Self {
+            albedo,
+            normal: lefts(self.normal, part.normal),
+            depth: left(self.depth, part.depth),
+            object: self.object,
+        }
     }
 }
 
 /// The number of an object, and whether anything shines in the same pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Seen(u32);
+pub struct ObjectFlags(u32);
 
-impl Seen {
+impl ObjectFlags {
     const SHINES: u32 = 1 << 31;
 
     /// Object number + 1 of the first sample; 0 where it met nothing.
-    pub fn object_id(self) -> u32 {
+    pub fn id(self) -> u32 {
         self.0 & !Self::SHINES
     }
 
