@@ -1,10 +1,10 @@
 //! Does the picture agree with Mitsuba 3's, pixel by pixel? A t test with both renderers' own scatter.
 //!
 //! `cargo bench --bench agreement` renders each scene with ten seeds by each renderer (`python3`, or
-//! `FECHNER_MITSUBA_PYTHON`, must have Mitsuba) and tests in every pixel whether the two means of ten luminances differ
-//! (two-sided t test, 18 degrees of freedom). If the renderers agree, a share α of the pixels is beyond the critical value
-//! of α. The ratio of the pictures' means stands with its standard error, from the scatter of the seeds. A map of t is
-//! written to `benches/cache/agreement`: red where ours is brighter, blue where Mitsuba's is.
+//! `FECHNER_MITSUBA_PYTHON`, must have Mitsuba) and tests in every pixel whether the two means of ten luminances
+//! differ (two-sided t test, 18 degrees of freedom). If the renderers agree, a share α of the pixels is beyond the
+//! critical value of α. The ratio of the pictures' means stands with its standard error, from the scatter of the
+//! seeds. A map of t is written to `benches/cache/agreement`: red where ours is brighter, blue where Mitsuba's is.
 
 #[path = "support/mod.rs"]
 mod support;

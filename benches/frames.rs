@@ -1,8 +1,9 @@
-//! What a frame of the live preview costs: its sRGB bytes, by our table and by `powf`, and its JPEG, by the encoder that is used and
-//! by the `image` crate's.
+//! What a frame of the live preview costs: its sRGB bytes, by our table and by `powf`, and its JPEG, by the encoder
+//! that is used and by the `image` crate's.
 //!
-//! `cargo bench --bench frames -- PICTURE.png ...` prints a row for each picture: milliseconds of one thread (best of 15, in turn;
-//! the table's with its dither, `powf`'s without), bytes, and the JPEG's root mean square error in steps of 8 bits.
+//! `cargo bench --bench frames -- PICTURE.png ...` prints a row for each picture: milliseconds of one thread (best of
+//! 15, in turn; the table's with its dither, `powf`'s without), bytes, and the JPEG's root mean square error in steps
+//! of 8 bits.
 
 use anyhow::{Context, Result};
 use fechner::output::encode_srgb8;

@@ -1,6 +1,7 @@
 //! How long a mesh of a million triangles takes from file to tree, over reading its bytes and building the tree alone.
 //!
-//! `cargo bench -p fechner --bench loading` (nothing else running: the ratios are of minima of several interleaved rounds)
+//! `cargo bench -p fechner --bench loading` (nothing else running: the ratios are of minima of several interleaved
+//! rounds)
 
 use fechner::geometry::World;
 use fechner::scene::load::{LoadOptions, load};

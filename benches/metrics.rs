@@ -1,7 +1,8 @@
-//! FLIP and ColorVideoVDP of two PNG files by the crates that `fechner bench` uses, to be held against their authors' programs.
+//! FLIP and ColorVideoVDP of two PNG files by the crates that `fechner bench` uses, to be held against their authors'
+//! programs.
 //!
-//! `cargo bench --bench metrics -- REFERENCE.png TEST.png` prints one line; `benches/peers/metrics_check.py` calls it and prints the
-//! difference to `flip-evaluator` and `cvvdp` from PyPI.
+//! `cargo bench --bench metrics -- REFERENCE.png TEST.png` prints one line; `benches/peers/metrics_check.py` calls it
+//! and prints the difference to `flip-evaluator` and `cvvdp` from PyPI.
 
 use anyhow::{Context, Result};
 use colorvideovdp::{Color, Cvvdp, DisplayModel, Execution, Image, Options};

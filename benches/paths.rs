@@ -1,8 +1,9 @@
 //! Samples (paths) per second of the path tracer, against Mitsuba 3 `llvm_ad_rgb` on the same scenes.
 //!
-//! `cargo bench --bench paths` writes the scenes to `benches/cache/paths` and renders them, 16 samples a pixel and at most
-//! 8 scattering events, with one thread and with two. Mitsuba joins where `python3` (or `FECHNER_MITSUBA_PYTHON`) has it:
-//! rounds of both alternate and the best of each counts. `-- cornell` or `-- cave` measures one scene alone.
+//! `cargo bench --bench paths` writes the scenes to `benches/cache/paths` and renders them, 16 samples a pixel and at
+//! most 8 scattering events, with one thread and with two. Mitsuba joins where `python3` (or
+//! `FECHNER_MITSUBA_PYTHON`) has it: rounds of both alternate and the best of each counts. `-- cornell` or `-- cave`
+//! measures one scene alone.
 //!
 //! Seconds are CPU seconds of all threads of each program, so that other work on the machine does not count; only the
 //! speed-up of two threads is taken from the clock on the wall, and means something on a quiet machine alone.

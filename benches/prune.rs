@@ -1,8 +1,9 @@
 //! What leaving faint light to chance saves (`--prune tvi`), and what it costs in noise.
 //!
-//! `cargo bench --bench prune [-- SCENE...]` prints the table of `benches/results/transport.md` in a minute. Even samples with and without, the same
-//! seed, one thread, alternating; noise is the mean over the picture of a sample's variance over its squared mean, both of luminance. Worth
-//! is how many times as much is seen in a processor second: seconds times noise without it, over the same with it.
+//! `cargo bench --bench prune [-- SCENE...]` prints the table of `benches/results/transport.md` in a minute. Even
+//! samples with and without, the same seed, one thread, alternating; noise is the mean over the picture of a sample's
+//! variance over its squared mean, both of luminance. Worth is how many times as much is seen in a processor second:
+//! seconds times noise without it, over the same with it.
 
 #[path = "support/mod.rs"]
 mod support;

@@ -1,8 +1,9 @@
 //! Rays per second of the tree, one thread, against Embree 3.13 (robust mode, one ray a call) on the same rays.
 //!
-//! `cargo bench --bench rays` writes the meshes and rays to `benches/cache/rays` and prints our own figures; `-- 1M` measures that mesh alone. Embree joins
-//! if `benches/peers/embree/build.sh` was run before (it needs Debian's `libembree-dev`): rounds of both alternate, seconds are the measuring thread's CPU time, the
-//! best round of each counts, and the column `ratio` is ours over Embree's.
+//! `cargo bench --bench rays` writes the meshes and rays to `benches/cache/rays` and prints our own figures; `-- 1M`
+//! measures that mesh alone. Embree joins if `benches/peers/embree/build.sh` was run before (it needs Debian's
+//! `libembree-dev`): rounds of both alternate, seconds are the measuring thread's CPU time, the best round of each
+//! counts, and the column `ratio` is ours over Embree's.
 
 #[path = "support/mod.rs"]
 mod support;

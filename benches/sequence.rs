@@ -1,10 +1,11 @@
 //! What handing out samples along a Z-curve gains over independent pixels, as the eye sees it.
 //!
-//! `cargo bench --bench sequence [-- SCENE...]` prints the table of `benches/results/sampling.md` in minutes of one core. Two renders of
-//! different seeds, uniform at 4, 16 and 64 samples a pixel and adaptive at visibility 4; their difference over √2 has the
-//! energy of one render's error and its frequencies, whatever they are. It is shown, filtered by the eye's contrast sensitivity
-//! with the thresholds of one 256-sample render, and its root mean square over the picture is what the table calls error.
-//! Both sequences have the same pairs of seeds; worth is the geometric mean over the pairs, with its 95 % interval by Student's t.
+//! `cargo bench --bench sequence [-- SCENE...]` prints the table of `benches/results/sampling.md` in minutes of one
+//! core. Two renders of different seeds, uniform at 4, 16 and 64 samples a pixel and adaptive at visibility 4; their
+//! difference over √2 has the energy of one render's error and its frequencies, whatever they are. It is shown,
+//! filtered by the eye's contrast sensitivity with the thresholds of one 256-sample render, and its root mean square
+//! over the picture is what the table calls error. Both sequences have the same pairs of seeds; worth is the
+//! geometric mean over the pairs, with its 95 % interval by Student's t.
 
 #[path = "support/mod.rs"]
 mod support;

@@ -1,10 +1,11 @@
-//! What a live preview costs and what it is worth: time to the first picture, samples a second beside a render that nobody
-//! watches, and quality over the first seconds against uniform progressive rendering by the same tracer.
+//! What a live preview costs and what it is worth: time to the first picture, samples a second beside a render that
+//! nobody watches, and quality over the first seconds against uniform progressive rendering by the same tracer.
 //!
-//! `cargo bench --bench preview [-- first|overhead|two-threads|race SCENE --size N --seconds S --seeds N --reference N]` prints the
-//! tables of `benches/results/preview.md`, or those that are named, of all scenes or those that are named. Every arm but those of two threads renders on one, whose own processor time is
-//! the clock, so that others' work on the machine counts only through caches; a browser's part is played by a WebSocket that takes
-//! every frame, on another thread.
+//! `cargo bench --bench preview [-- first|overhead|two-threads|race SCENE --size N --seconds S --seeds N --reference
+//! N]` prints the tables of `benches/results/preview.md`, or those that are named, of all scenes or those that are
+//! named. Every arm but those of two threads renders on one, whose own processor time is the clock, so that others'
+//! work on the machine counts only through caches; a browser's part is played by a WebSocket that takes every frame,
+//! on another thread.
 
 mod overhead;
 mod race;

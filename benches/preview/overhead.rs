@@ -14,8 +14,8 @@ const SPP: u32 = 96;
 /// Who renders, and how the two of a pair are timed.
 #[derive(Clone, Copy)]
 pub(super) enum Threads {
-    /// By their own processor time, each on a core of its own at once: the machine's pace changes within seconds, by more than
-    /// watching costs.
+    /// By their own processor time, each on a core of its own at once: the machine's pace changes within seconds, by
+    /// more than watching costs.
     One,
     /// By the wall's clock, one after the other in alternating order.
     Two,

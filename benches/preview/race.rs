@@ -1,5 +1,5 @@
-//! Quality over the first seconds: what one sees of a preview beside a uniform progressive render that is shown at no cost, and
-//! beside the same preview where it samples evenly, which pays for frames and looks too.
+//! Quality over the first seconds: what one sees of a preview beside a uniform progressive render that is shown at no
+//! cost, and beside the same preview where it samples evenly, which pays for frames and looks too.
 
 use super::watched::{Moment, Watched};
 use super::{Arguments, Subject, one_sample_each, one_thread};

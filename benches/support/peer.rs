@@ -1,7 +1,7 @@
 //! A scene written down for Mitsuba 3, and Mitsuba as a child process that renders it when asked.
 //!
-//! Diffuse, smooth conductor and smooth dielectric surfaces, textures on the diffuse ones, meshes and spheres that emit:
-//! what both renderers mean the same thing by. Anything else is refused.
+//! Diffuse, smooth conductor and smooth dielectric surfaces, textures on the diffuse ones, meshes and spheres that
+//! emit: what both renderers mean the same thing by. Anything else is refused.
 
 use anyhow::{Context, Result, bail};
 use fechner::scene::{ColorInput, Encoding, Material, Projection, Scene, Surface, Texels};

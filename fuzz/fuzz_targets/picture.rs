@@ -1,5 +1,5 @@
-//! Whatever bytes stand in a picture (told by its first byte: PNG, JPEG, Radiance, TGA or EXR), reading it as surroundings
-//! ends in texels or in one clear error.
+//! Whatever bytes stand in a picture (told by its first byte: PNG, JPEG, Radiance, TGA or EXR), reading it as
+//! surroundings ends in texels or in one clear error.
 #![no_main]
 
 use fechner::scene::load::environment;

@@ -1,4 +1,5 @@
-//! Whatever bytes stand in Mitsuba's .serialized file, loading a scene that uses it ends in a scene or in one clear error.
+//! Whatever bytes stand in Mitsuba's .serialized file, loading a scene that uses it ends in a scene or in one clear
+//! error.
 #![no_main]
 
 use fechner::scene::load::{LoadOptions, load};

@@ -8,8 +8,8 @@ use fechner_perception::{CastleCsf, GuideNoise, Plane, ThresholdInputs, Viewing,
 use rayon::prelude::*;
 use rustfft::num_complex::Complex32;
 
-/// The least of a few runs, in seconds of all threads' time on the processors: unlike the clock on the wall it does not count how long
-/// other programs had them. Where the system does not tell, the clock on the wall.
+/// The least of a few runs, in seconds of all threads' time on the processors: unlike the clock on the wall it does
+/// not count how long other programs had them. Where the system does not tell, the clock on the wall.
 fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
     (0..runs)
         .map(|_| {
@@ -40,8 +40,8 @@ fn memory(figure: &str) -> Option<f64> {
     Some(1024.0 * line.trim().strip_suffix("kB")?.trim().parse::<f64>().ok()?)
 }
 
-/// Prints how much memory a threshold map takes at its worst, beyond the picture itself. The first thing the program does, so
-/// that nothing given back earlier hides it.
+/// Prints how much memory a threshold map takes at its worst, beyond the picture itself. The first thing the program
+/// does, so that nothing given back earlier hides it.
 fn report_memory() {
     let (width, height) = (1920, 1080);
     let picture = Plane::from_fn(width, height, |x, y| 50.0 + ((x * 31 + y * 17) % 13) as f32);
@@ -125,7 +125,8 @@ fn main() {
         };
         report("allocation", fastest(3, || drop(allocate(&problem))));
         if let Ok(found) = allocate(&problem) {
-            // Multipliers are solved for on blocks of pixels, the gap is taken at every pixel: it bounds what both leave.
+            // Multipliers are solved for on blocks of pixels, the gap is taken at every pixel: it bounds what both
+            // leave.
             println!(
                 "{width}×{height}  allocation costs at most {:.2} % more than the optimum, after {} updates",
                 100.0 * found.gap,

@@ -1,8 +1,8 @@
 //! How well the contrast sensitivity functions fit what people saw.
 //!
-//! Reads the measurements that castleCSF was fitted to (`data_aggregated_merged.csv` of gfxdisp/castleCSF), whose path is
-//! the environment variable `CASTLE_CSF_DATA`, and prints RMS errors in dB: as they are, and with each model's median
-//! error taken out. Static foveal gratings of at least 1 cd/m² and at most 20 cpd.
+//! Reads the measurements that castleCSF was fitted to (`data_aggregated_merged.csv` of gfxdisp/castleCSF), whose
+//! path is the environment variable `CASTLE_CSF_DATA`, and prints RMS errors in dB: as they are, and with each
+//! model's median error taken out. Static foveal gratings of at least 1 cd/m² and at most 20 cpd.
 
 mod support;
 #[path = "support/table.rs"]

@@ -1,10 +1,11 @@
-//! What noise does to masks: m(guide) / m(reference), the elevation of thresholds that a path tracer's guide gives over that of the
-//! picture without noise. Above 1, noise hides noise; below 1, a render stops later than it could.
+//! What noise does to masks: m(guide) / m(reference), the elevation of thresholds that a path tracer's guide gives
+//! over that of the picture without noise. Above 1, noise hides noise; below 1, a render stops later than it could.
 //!
-//! A wall with three parts (flat; texture in the albedo, which the guide's filter is told of; texture in the light, which it is
-//! not), log-normal noise whose standard deviation for one sample is the pixel's own luminance, and 4 to 1024 samples. Printed are
-//! the median over each part of m from the denoised guide, given its variance before denoising (what a render uses), with all of that
-//! taken out, and as if it were clean; and from the noisy mean, its variance taken out, and as if it were clean.
+//! A wall with three parts (flat; texture in the albedo, which the guide's filter is told of; texture in the light,
+//! which it is not), log-normal noise whose standard deviation for one sample is the pixel's own luminance, and 4 to
+//! 1024 samples. Printed are the median over each part of m from the denoised guide, given its variance before
+//! denoising (what a render uses), with all of that taken out, and as if it were clean; and from the noisy mean, its
+//! variance taken out, and as if it were clean.
 
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::photometry::luminance;

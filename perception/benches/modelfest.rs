@@ -1,14 +1,14 @@
 //! How visible this crate calls what people could only just see: the 43 stimuli of ModelFest.
 //!
-//! Made again from their published definitions (Carney et al., "Development of an image/threshold database for designing and
-//! testing human vision models", 1999; Watson and Ahumada, "A standard model for foveal detection of spatial contrast", 2005):
-//! 256×256 pixels, 120 pixels a degree, 30 cd/m², at the mean threshold contrast of 16 observers. Thresholds, the noise sample and
-//! the natural scene are data: the environment variable `MODELFEST_DATA` names the folder that has `modelfest_data.csv`,
-//! `modelfest_noise.tif` and `modelfest_natural_scene.tif`, as the Python package stimupy installs it
-//! (`pip install stimupy`, then `site-packages/stimupy/papers`).
+//! Made again from their published definitions (Carney et al., "Development of an image/threshold database for
+//! designing and testing human vision models", 1999; Watson and Ahumada, "A standard model for foveal detection of
+//! spatial contrast", 2005): 256×256 pixels, 120 pixels a degree, 30 cd/m², at the mean threshold contrast of 16
+//! observers. Thresholds, the noise sample and the natural scene are data: the environment variable `MODELFEST_DATA`
+//! names the folder that has `modelfest_data.csv`, `modelfest_noise.tif` and `modelfest_natural_scene.tif`, as the
+//! Python package stimupy installs it (`pip install stimupy`, then `site-packages/stimupy/papers`).
 //!
-//! A perfect model would call every stimulus v = 1.04: thresholds are for 84 % correct of two, v = 1 is 82 %. Stimuli faded in and
-//! out over half a second, which is not modelled here.
+//! A perfect model would call every stimulus v = 1.04: thresholds are for 84 % correct of two, v = 1 is 82 %. Stimuli
+//! faded in and out over half a second, which is not modelled here.
 
 mod stimuli;
 mod support;

@@ -1,5 +1,5 @@
-//! The finest grating that can be seen, against luminance: Shlaer's data as the tone operators use them, and where the contrast
-//! sensitivity functions that know luminance fall to 1 (a grating of full contrast).
+//! The finest grating that can be seen, against luminance: Shlaer's data as the tone operators use them, and where
+//! the contrast sensitivity functions that know luminance fall to 1 (a grating of full contrast).
 
 #[path = "support/log_plot.rs"]
 mod log_plot;

@@ -1,6 +1,6 @@
-//! Out of a theatre into sunlight, and from there into a cave: what is in view, what cones and rods are adapted to, and what the
-//! display shows for a grey and for a white wall, over the time since the step from 1 ms to 1000 s. Two pictures, named
-//! in what is printed; the first argument is the folder for them.
+//! Out of a theatre into sunlight, and from there into a cave: what is in view, what cones and rods are adapted to,
+//! and what the display shows for a grey and for a white wall, over the time since the step from 1 ms to 1000 s. Two
+//! pictures, named in what is printed; the first argument is the folder for them.
 
 #[path = "support/log_plot.rs"]
 mod log_plot;

@@ -1,8 +1,8 @@
 //! A Campbell–Robson chart and the boundary that the model predicts for it.
 //!
-//! Frequency rises to the right from 0.5 to 20 cpd, contrast falls upwards from 1 to 1/400. Above, the chart, for 60 pixels a
-//! degree; below it the same with every place that the model calls visible tinted, and 1/S of castleCSF as a line. The tint
-//! should end at the line, and there where you stop seeing bars.
+//! Frequency rises to the right from 0.5 to 20 cpd, contrast falls upwards from 1 to 1/400. Above, the chart, for 60
+//! pixels a degree; below it the same with every place that the model calls visible tinted, and 1/S of castleCSF as a
+//! line. The tint should end at the line, and there where you stop seeing bars.
 
 #[path = "support/target.rs"]
 mod target;

@@ -1,6 +1,6 @@
-//! Daly's spatiovelocity contrast sensitivity as a surface: darker is more sensitive, with contours at sensitivities 1, 3, 10,
-//! 30, 100 and 200, and the frequency of the peak at each velocity. What moves fast over the retina is seen only where it is
-//! coarse.
+//! Daly's spatiovelocity contrast sensitivity as a surface: darker is more sensitive, with contours at sensitivities
+//! 1, 3, 10, 30, 100 and 200, and the frequency of the peak at each velocity. What moves fast over the retina is seen
+//! only where it is coarse.
 
 #[path = "support/target.rs"]
 mod target;

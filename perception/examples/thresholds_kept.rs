@@ -1,6 +1,6 @@
-//! What castleCSF says of patches that operators are built to keep at threshold: one threshold step (L / peak sensitivity, 1
-//! deg²) on a uniform scene, as a multiple of the threshold of the patch that the display shows. The operators keep the
-//! thresholds of their own laws; this table says how far those laws are from today's.
+//! What castleCSF says of patches that operators are built to keep at threshold: one threshold step (L / peak
+//! sensitivity, 1 deg²) on a uniform scene, as a multiple of the threshold of the patch that the display shows. The
+//! operators keep the thresholds of their own laws; this table says how far those laws are from today's.
 
 use fechner_perception::tone::{SceneGuide, operator};
 use fechner_perception::tvi::{ThresholdBase, base_threshold_cd_m2};

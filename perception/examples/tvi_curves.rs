@@ -1,5 +1,6 @@
-//! Threshold against intensity from starlight to sunlight: rods, cones, both, the curve shifted to complex pictures, and the
-//! luminance over castleCSF's peak sensitivity. Every value is the smallest luminance difference that is seen, cd/m².
+//! Threshold against intensity from starlight to sunlight: rods, cones, both, the curve shifted to complex pictures,
+//! and the luminance over castleCSF's peak sensitivity. Every value is the smallest luminance difference that is
+//! seen, cd/m².
 
 #[path = "support/log_plot.rs"]
 mod log_plot;

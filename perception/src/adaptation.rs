@@ -22,9 +22,9 @@ pub enum Mean {
     Geometric,
 }
 
-/// The luminance, cd/m², that the eye looking at each pixel adapts to: the mean over a Gaussian of σ 0.25° (as wide as a
-/// disc of 1°), at least 1e-4. Arithmetic means first bring down pixels that outshine all their neighbours, or all but one:
-/// fireflies, alone or in pairs.
+/// The luminance, cd/m², that the eye looking at each pixel adapts to: the mean over a Gaussian of σ 0.25° (as wide
+/// as a disc of 1°), at least 1e-4. Arithmetic means first bring down pixels that outshine all their neighbours, or
+/// all but one: fireflies, alone or in pairs.
 ///
 /// # Errors
 /// [`Error::Empty`] and [`Error::BadPixel`] for no picture, [`Error::OutOfRange`] for an impossible display.
@@ -72,8 +72,8 @@ fn blurred(plane: &Plane, display: &Display) -> Plane {
     gaussian_blur_xy(plane, display.pixel_density().pixels(POOLING_SIGMA_DEG))
 }
 
-/// Every pixel lowered to the second brightest of its eight neighbours where it exceeds that: fireflies, alone and in pairs.
-/// In a picture one pixel wide, whose ends have a single neighbour, to the brightest.
+/// Every pixel lowered to the second brightest of its eight neighbours where it exceeds that: fireflies, alone and in
+/// pairs. In a picture one pixel wide, whose ends have a single neighbour, to the brightest.
 fn without_fireflies(plane: &Plane) -> Plane {
     let (width, height) = (plane.width(), plane.height());
     if width * height == 1 {

@@ -1,10 +1,10 @@
 //! How many samples each pixel needs: the cheapest counts that bring visibility down to a target everywhere.
 //!
-//! Minimise Σ cᵢ nᵢ subject to 2 g ⊗ (N σ²/n) ≤ v\*² at every pixel and `min_samples` ≤ n ≤ `max_samples`. The problem is
-//! convex in 1/n. With a multiplier λ(x) ≥ 0 for each constraint and μ = g ⊗ λ (g is symmetric), the best counts are
-//! nᵢ = √(wᵢ μᵢ / cᵢ), w = 2 N σ², clamped: Neyman's allocation, weighted by what the eye pools. Multipliers grow where the
-//! constraint is violated and fade where it is slack; by weak duality any of them bounds the cheapest cost from below,
-//! which is the certificate every [`Allocation`] carries.
+//! Minimise Σ cᵢ nᵢ subject to 2 g ⊗ (N σ²/n) ≤ v\*² at every pixel and `min_samples` ≤ n ≤ `max_samples`. The
+//! problem is convex in 1/n. With a multiplier λ(x) ≥ 0 for each constraint and μ = g ⊗ λ (g is symmetric), the best
+//! counts are nᵢ = √(wᵢ μᵢ / cᵢ), w = 2 N σ², clamped: Neyman's allocation, weighted by what the eye pools.
+//! Multipliers grow where the constraint is violated and fade where it is slack; by weak duality any of them bounds
+//! the cheapest cost from below, which is the certificate every [`Allocation`] carries.
 //!
 //! For noise that is independent from pixel to pixel and whose variance falls as 1/n. Not for bias, which no count
 //! brings down, nor for masks that change while samples come: thresholds are taken as given.
@@ -27,9 +27,10 @@ pub struct AllocationProblem<'a> {
     /// Cost of one sample, in any unit (rays and node visits, not seconds); positive.
     pub cost: &'a Plane,
     /// Multiplies the visibility allowed at each pixel (a user's importance map: below 1 where it matters more);
-    /// `None` is 1 everywhere. Beside a steep step noise comes over that bands smear further than the pooling window that counts are found
-    /// by: behind one from 4 to 0.25 [`ThresholdMap::predicted_visibility`] is up to 1.13 times what is asked for at 4 pixels a degree, 1.04
-    /// at 10 to 38, 1.02 from 60 on, though every constraint here is met; behind one from 2 to 0.5 1.03 and 1.01.
+    /// `None` is 1 everywhere. Beside a steep step noise comes over that bands smear further than the pooling window
+    /// that counts are found by: behind one from 4 to 0.25 [`ThresholdMap::predicted_visibility`] is up to 1.13 times
+    /// what is asked for at 4 pixels a degree, 1.04 at 10 to 38, 1.02 from 60 on, though every constraint here is
+    /// met; behind one from 2 to 0.5 1.03 and 1.01.
     pub tolerance: Option<&'a Plane>,
     /// Visibility v\* that may remain, in threshold units.
     pub visibility: f64,
@@ -37,8 +38,8 @@ pub struct AllocationProblem<'a> {
     pub min_samples: f64,
     /// Most samples a pixel gets.
     pub max_samples: f64,
-    /// Share above the cheapest cost at which the search may end: [`FINE_GAP`], or more where counts are rounded anyway. Not
-    /// a promise: the search also ends after a number of updates.
+    /// Share above the cheapest cost at which the search may end: [`FINE_GAP`], or more where counts are rounded
+    /// anyway. Not a promise: the search also ends after a number of updates.
     pub enough_gap: f64,
 }
 
@@ -59,8 +60,8 @@ pub struct Allocation {
     pub lower_bound: f64,
     /// Share by which the counts cost more than the cheapest at most: `cost / lower_bound − 1`, not below 0.
     pub gap: f64,
-    /// The visibility that was asked for. For a fixed budget: the greatest that the counts leave anywhere, over what is tolerated
-    /// there, be it because `max_samples` does not reach further.
+    /// The visibility that was asked for. For a fixed budget: the greatest that the counts leave anywhere, over what
+    /// is tolerated there, be it because `max_samples` does not reach further.
     pub visibility: f64,
     /// Pixels whose visibility stays above what was asked for even with `max_samples` everywhere. Their constraints are
     /// relaxed to what can be reached (plus 1 % of v²).
@@ -73,8 +74,8 @@ pub struct Allocation {
 /// Finds the cheapest counts that bring visibility to the target.
 ///
 /// # Errors
-/// [`Error::SizeMismatch`], [`Error::BadPixel`] and [`Error::OutOfRange`] for planes that do not fit the threshold map, values
-/// that are negative or not finite, costs of 0 and impossible limits.
+/// [`Error::SizeMismatch`], [`Error::BadPixel`] and [`Error::OutOfRange`] for planes that do not fit the threshold
+/// map, values that are negative or not finite, costs of 0 and impossible limits.
 ///
 /// ```
 /// use fechner_perception::{CastleCsf, Plane, ThresholdInputs, Viewing, threshold_map};
@@ -108,12 +109,12 @@ const FARTHEST: f64 = 20.7;
 /// Share of the budget that counts as all of it.
 const MIN_SPENT: f64 = 0.99;
 
-/// Visibilities that the search tries at most. Eight doubled steps cross all that there are; the others are for brackets. A search that is
-/// not done then ends with the best that it has.
+/// Visibilities that the search tries at most. Eight doubled steps cross all that there are; the others are for
+/// brackets. A search that is not done then ends with the best that it has.
 const MAX_ROUNDS: u32 = 40;
 
-/// Width of a bracket of log visibility at which the search ends though less than [`MIN_SPENT`] of the budget is spent: cost goes as v⁻²,
-/// so that 0.02 % of it is left to be found, and what jumps within is limits.
+/// Width of a bracket of log visibility at which the search ends though less than [`MIN_SPENT`] of the budget is
+/// spent: cost goes as v⁻², so that 0.02 % of it is left to be found, and what jumps within is limits.
 const NARROWEST_BRACKET: f64 = 1e-4;
 
 /// Share of a bracket that goes in every round at least, wherever the aim is.
@@ -122,11 +123,11 @@ const MIN_CUT: f64 = 0.1;
 /// Share by which rounding may bring the sum of the fewest counts over the cheapest cost.
 const ROUNDING: f64 = 1e-9;
 
-/// Finds the lowest visibility that `budget` (Σ cᵢ nᵢ) can pay for, and the counts for it; `problem.visibility` is where
-/// the search begins.
+/// Finds the lowest visibility that `budget` (Σ cᵢ nᵢ) can pay for, and the counts for it; `problem.visibility` is
+/// where the search begins.
 ///
-/// The cost stays within 1 % below the budget, unless `min_samples` everywhere costs more (they are paid for all the same) or
-/// `max_samples` less. The certificate is of the visibility that is reached.
+/// The cost stays within 1 % below the budget, unless `min_samples` everywhere costs more (they are paid for all the
+/// same) or `max_samples` less. The certificate is of the visibility that is reached.
 ///
 /// # Errors
 /// As [`allocate`], and [`Error::OutOfRange`] for a budget that is not positive.
@@ -168,7 +169,8 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
             let margin = MIN_CUT * (affordable - too_dear);
             aimed.clamp(too_dear + margin, affordable - margin)
         } else {
-            // Limits make the cost respond less than the law says, and far from the answer not at all: ever greater steps.
+            // Limits make the cost respond less than the law says, and far from the answer not at all: ever greater
+            // steps.
             let step = (aimed - visibility.ln()).abs().max(least_step);
             least_step *= 2.0;
             visibility.ln() + (aimed - visibility.ln()).signum() * step

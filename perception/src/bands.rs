@@ -51,10 +51,10 @@ impl OctaveBands {
 
     /// Amplitude gain of `band` for the guide: closed at the bottom, so that a slow gradient is no mask.
     ///
-    /// From its centre on the open last band counts contrast by the eye's `sensitivity` (any scale) there and not at its centre: what
-    /// cannot be seen is no mask. Measured without it: stripes of 100 cpd at a tenth of their threshold raise that of
-    /// 16 cpd threefold, and on 38 pixels a degree a grating of 18 cpd at half its threshold raises that of 8 cpd by
-    /// 1.39 (Daly's formula: 1.03).
+    /// From its centre on the open last band counts contrast by the eye's `sensitivity` (any scale) there and not at
+    /// its centre: what cannot be seen is no mask. Measured without it: stripes of 100 cpd at a tenth of their
+    /// threshold raise that of 16 cpd threefold, and on 38 pixels a degree a grating of 18 cpd at half its threshold
+    /// raises that of 8 cpd by 1.39 (Daly's formula: 1.03).
     pub(crate) fn mask_gain(&self, band: usize, freq_cpd: f64, sensitivity: impl Fn(f64) -> f64) -> f64 {
         if freq_cpd <= 0.0 {
             return 0.0;
@@ -86,7 +86,8 @@ pub(crate) struct RadialTable {
 
 /// Fewest entries of a table.
 const RADIAL_STEPS: usize = 2048;
-/// Widest step of a table: sensitivity at low frequencies bends within a few of them, however fine the display's pixels.
+/// Widest step of a table: sensitivity at low frequencies bends within a few of them, however fine the display's
+/// pixels.
 const WIDEST_STEP_CPD: f64 = 0.04;
 
 impl RadialTable {

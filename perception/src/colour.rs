@@ -29,8 +29,8 @@ pub struct ColourThresholds {
     pub yellow_violet: ThresholdMap,
 }
 
-/// Finds the thresholds of a displayed picture (linear Rec. 709 RGB in cd/m², row-major, denoised) for errors of any colour, with
-/// castleCSF for the observer's area.
+/// Finds the thresholds of a displayed picture (linear Rec. 709 RGB in cd/m², row-major, denoised) for errors of any
+/// colour, with castleCSF for the observer's area.
 ///
 /// # Errors
 /// [`Error::ValueCount`] unless there are `width * height` pixels; else as [`threshold_map`].
@@ -64,16 +64,17 @@ pub fn colour_thresholds(
     })
 }
 
-/// Visibility at each pixel of the colour alone of the error that two halves of a picture show, half their difference in linear Rec. 709 RGB
-/// on the display, cd/m²: the greater of castleCSF's red–green and yellow–violet, for the observer's area. `acuity` is what
-/// an operator takes away of the picture, and of this error with it. For error at rest: no motion hides it.
+/// Visibility at each pixel of the colour alone of the error that two halves of a picture show, half their difference
+/// in linear Rec. 709 RGB on the display, cd/m²: the greater of castleCSF's red–green and yellow–violet, for the
+/// observer's area. `acuity` is what an operator takes away of the picture, and of this error with it. For error at
+/// rest: no motion hides it.
 ///
-/// `noise_of_picture` is the variance of the noise that the picture itself has, over that of this error: 0 of a picture without noise, 1 of the
-/// mean of the two halves. Such noise hides none of the error.
+/// `noise_of_picture` is the variance of the noise that the picture itself has, over that of this error: 0 of a
+/// picture without noise, 1 of the mean of the two halves. Such noise hides none of the error.
 ///
 /// # Errors
-/// [`Error::ValueCount`] unless picture and error have `width * height` pixels; [`Error::OutOfRange`] for a variance that is negative; else
-/// as [`chromatic_threshold_map`].
+/// [`Error::ValueCount`] unless picture and error have `width * height` pixels; [`Error::OutOfRange`] for a variance
+/// that is negative; else as [`chromatic_threshold_map`].
 pub fn chromatic_visibility(
     display_rgb_cd_m2: &[[f32; 3]],
     half_difference_rgb: &[[f32; 3]],
@@ -101,8 +102,9 @@ pub fn chromatic_visibility(
 }
 
 impl ColourThresholds {
-    /// Visibility at each pixel of the error that two halves of a picture show, half their difference in linear Rec. 709 RGB
-    /// on the display, cd/m²: the greatest over the three channels (see [`ThresholdMap::measured_visibility`]).
+    /// Visibility at each pixel of the error that two halves of a picture show, half their difference in linear Rec.
+    /// 709 RGB on the display, cd/m²: the greatest over the three channels (see
+    /// [`ThresholdMap::measured_visibility`]).
     ///
     /// # Errors
     /// [`Error::ValueCount`] for an error of another size.
@@ -120,8 +122,9 @@ impl ColourThresholds {
 }
 
 impl ThresholdMap {
-    /// N(x) in 1/(cd/m²)² of a chromatic channel: white pixel noise of variance σ² in that opponent signal has visibility
-    /// v with v² = 2 N σ². Under the adaptation of this map, without masking (an upper bound that needs no transform).
+    /// N(x) in 1/(cd/m²)² of a chromatic channel: white pixel noise of variance σ² in that opponent signal has
+    /// visibility v with v² = 2 N σ². Under the adaptation of this map, without masking (an upper bound that needs no
+    /// transform).
     ///
     /// # Errors
     /// As [`CastleChromatic::new`].
@@ -160,9 +163,9 @@ impl ThresholdMap {
         })
     }
 
-    /// The luminance variance that would be as visible as the most visible of three channels' noise: max over channels of
-    /// `N_c` `σ_c²`, over N. Planes in (cd/m²)² on the display, in the order of [`Opponent`]; infinite everywhere for planes of other
-    /// sizes than this map's.
+    /// The luminance variance that would be as visible as the most visible of three channels' noise: max over
+    /// channels of `N_c` `σ_c²`, over N. Planes in (cd/m²)² on the display, in the order of [`Opponent`]; infinite
+    /// everywhere for planes of other sizes than this map's.
     #[must_use]
     pub fn luminance_equivalent_variance(&self, gains: &ChromaticGains, variances: [&Plane; 3]) -> Plane {
         let [achromatic, red_green, yellow_violet] = variances;

@@ -57,15 +57,16 @@ impl Difference {
 /// Predicts what can be seen of the difference between two pictures' displayed luminances (cd/m²).
 ///
 /// After Daly, "The visible differences predictor", 1993: amplitude nonlinearity by local adaptation, the contrast
-/// sensitivity function (`csf`, any of [`crate::csf`]), masking by band. Changed: isotropic octave bands instead of the
-/// cortex transform, bands added by energy and pooled over 1° instead of probability summation (so that its figure is the
-/// visibility that the rest of this crate uses), and sensitivity below 0.5 cpd held at its value there, so that a picture
-/// that is brighter as a whole counts. Masking is mutual, the lesser of what the two pictures mask: detail that only one
-/// of them has does not hide its own absence from the other. The eye adapts to the reference, so the two are not to be exchanged
-/// where one is much brighter.
+/// sensitivity function (`csf`, any of [`crate::csf`]), masking by band. Changed: isotropic octave bands instead of
+/// the cortex transform, bands added by energy and pooled over 1° instead of probability summation (so that its
+/// figure is the visibility that the rest of this crate uses), and sensitivity below 0.5 cpd held at its value there,
+/// so that a picture that is brighter as a whole counts. Masking is mutual, the lesser of what the two pictures mask:
+/// detail that only one of them has does not hide its own absence from the other. The eye adapts to the reference, so
+/// the two are not to be exchanged where one is much brighter.
 ///
-/// Beyond the border nothing differs: an error there is as visible as if both pictures went on alike. A difference that changes slowly
-/// (over 1° and more) has no edge at the border, since what is seen around a picture is no equal one.
+/// Beyond the border nothing differs: an error there is as visible as if both pictures went on alike. A difference
+/// that changes slowly (over 1° and more) has no edge at the border, since what is seen around a picture is no equal
+/// one.
 ///
 /// # Errors
 /// [`Error::SizeMismatch`], [`Error::Empty`], [`Error::BadPixel`] for pictures that cannot be compared,
@@ -97,8 +98,8 @@ pub fn difference(
     Ok(Difference::of(seen))
 }
 
-/// [`difference`] for pictures in colour (linear Rec. 709 RGB on the display, cd/m², row-major): at each pixel the most visible of the
-/// achromatic channel, through `csf`, and castleCSF's red–green and yellow–violet.
+/// [`difference`] for pictures in colour (linear Rec. 709 RGB on the display, cd/m², row-major): at each pixel the
+/// most visible of the achromatic channel, through `csf`, and castleCSF's red–green and yellow–violet.
 ///
 /// # Errors
 /// [`Error::ValueCount`] unless both pictures have `width * height` pixels; else as [`difference`].
@@ -225,7 +226,8 @@ mod tests {
         })
     }
 
-    /// Nothing differs beyond a border, so an error there is as visible as with an equal border around both pictures, at every pixel.
+    /// Nothing differs beyond a border, so an error there is as visible as with an equal border around both pictures,
+    /// at every pixel.
     #[test]
     fn an_error_at_the_border_is_as_visible_as_with_an_equal_surround() {
         let wide = 128;
@@ -248,8 +250,8 @@ mod tests {
         }
     }
 
-    /// What a picture's border is seen against is no part of the comparison: one that is brighter as a whole, or towards a side, must
-    /// not have an edge there.
+    /// What a picture's border is seen against is no part of the comparison: one that is brighter as a whole, or
+    /// towards a side, must not have an edge there.
     #[test]
     fn a_picture_brighter_as_a_whole_has_no_edge_at_its_border() {
         let grey = Plane::filled(180, 180, GREY_CD_M2);

@@ -21,8 +21,8 @@ pub struct Display {
     pub name: String,
     /// Pixels a degree of visual angle along a row, at the centre: 2 d tan(0.5°) / pixel pitch.
     pub pixels_per_degree: f64,
-    /// Width of a pixel over its height (as in an EXR's `pixelAspectRatio`): 1 for square pixels. `pixels_per_degree` is
-    /// counted along the rows; along the columns there are this many times as many.
+    /// Width of a pixel over its height (as in an EXR's `pixelAspectRatio`): 1 for square pixels. `pixels_per_degree`
+    /// is counted along the rows; along the columns there are this many times as many.
     #[serde(default = "square")]
     pub pixel_aspect_ratio: f64,
     /// Luminance of full white, cd/m².
@@ -145,7 +145,8 @@ impl Display {
         PixelDensity { horizontal, vertical: horizontal * self.pixel_aspect_ratio }
     }
 
-    /// Luminance, cd/m², of a mid grey, at which contrast sensitivity is taken where it has to be one for all of the picture.
+    /// Luminance, cd/m², of a mid grey, at which contrast sensitivity is taken where it has to be one for all of the
+    /// picture.
     #[must_use]
     pub fn grey_cd_m2(&self) -> f64 {
         0.2 * self.white_cd_m2
@@ -166,10 +167,10 @@ impl Display {
         self.black_cd_m2 + (self.white_cd_m2 - self.black_cd_m2) * light
     }
 
-    /// Linear display RGB, 0 the display's black and 1 its white, of a code value (clamped to 0..1; NaN counts as 0) that the display gets as
-    /// it is. With [`Eotf::Bt1886`] a code V is emitted as a (V + b)^2.4, where white and black decide a and b (Recommendation ITU-R
-    /// BT.1886, annex 1); with [`Eotf::Pq`] as the luminance that it means, as far as the display reaches; with others the curve
-    /// lies between black and white.
+    /// Linear display RGB, 0 the display's black and 1 its white, of a code value (clamped to 0..1; NaN counts as 0)
+    /// that the display gets as it is. With [`Eotf::Bt1886`] a code V is emitted as a (V + b)^2.4, where white and
+    /// black decide a and b (Recommendation ITU-R BT.1886, annex 1); with [`Eotf::Pq`] as the luminance that it
+    /// means, as far as the display reaches; with others the curve lies between black and white.
     ///
     /// ```
     /// use fechner_perception::Display;

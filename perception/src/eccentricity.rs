@@ -1,12 +1,12 @@
 //! Where one looks, and how sensitivity falls away from there.
 //!
-//! castleCSF (Ashraf et al. 2024, see [`crate::csf::CastleCsf`]): S falls by 10^−((e₀ + e₁ ρ) ε) for ρ cycles a degree at an
-//! eccentricity of ε degrees, with constants for the temporal and the nasal half of an eye's visual field. What is in
-//! one eye's nasal half is in the other's temporal half, so the better of both counts; above and below the gaze, where both eyes
-//! have the temporal constants, that is to the safe side.
+//! castleCSF (Ashraf et al. 2024, see [`crate::csf::CastleCsf`]): S falls by 10^−((e₀ + e₁ ρ) ε) for ρ cycles a
+//! degree at an eccentricity of ε degrees, with constants for the temporal and the nasal half of an eye's visual
+//! field. What is in one eye's nasal half is in the other's temporal half, so the better of both counts; above and
+//! below the gaze, where both eyes have the temporal constants, that is to the safe side.
 //!
-//! For a gaze that is known, as by an eye tracker or a pointer that stands for one. Not for pictures that are kept: who looks at
-//! them may look anywhere.
+//! For a gaze that is known, as by an eye tracker or a pointer that stands for one. Not for pictures that are kept:
+//! who looks at them may look anywhere.
 
 use crate::bands::{RINGS, for_each_ring};
 use crate::csf::ChromaticChannel;
@@ -72,7 +72,8 @@ const fn declines(channel: Channel) -> [Decline; 2] {
     }
 }
 
-/// Share of the foveal sensitivity that is left at an eccentricity, 0 to 1, for gratings of `freq_cpd`, seen by both eyes.
+/// Share of the foveal sensitivity that is left at an eccentricity, 0 to 1, for gratings of `freq_cpd`, seen by both
+/// eyes.
 ///
 /// ```
 /// use fechner_perception::eccentricity::{Channel, sensitivity_left};
@@ -98,7 +99,8 @@ pub fn eccentricity_deg(width: usize, height: usize, gaze: Gaze, density: PixelD
     })
 }
 
-/// A picture on a flat display whose middle is straight ahead of the eye: towards its borders a degree holds more pixels.
+/// A picture on a flat display whose middle is straight ahead of the eye: towards its borders a degree holds more
+/// pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct FlatDisplay {
     middle_px: [f64; 2],
@@ -131,8 +133,8 @@ impl FlatDisplay {
         sine.atan2(cosine).to_degrees()
     }
 
-    /// Degrees of a small motion of so many pixels at a place: φ from straight ahead cos² φ of what it would be there where it leads
-    /// outwards, cos φ of it where it leads around.
+    /// Degrees of a small motion of so many pixels at a place: φ from straight ahead cos² φ of what it would be there
+    /// where it leads outwards, cos φ of it where it leads around.
     #[must_use]
     pub fn motion_deg(&self, at: Gaze, motion_px: [f64; 2]) -> f64 {
         let at = self.place(at);
@@ -170,8 +172,9 @@ impl ThresholdMap {
     /// Thresholds of this picture for eyes that look at `gazes`, of which the nearest counts at every pixel; without
     /// any, nothing changes.
     ///
-    /// Each band's threshold is raised by the root of what is left of the energy that white noise has in it, at the middle one of
-    /// the picture's adaptation levels: the fall within a band is steep, and its centre alone would promise too much.
+    /// Each band's threshold is raised by the root of what is left of the energy that white noise has in it, at the
+    /// middle one of the picture's adaptation levels: the fall within a band is steep, and its centre alone would
+    /// promise too much.
     #[must_use]
     pub fn with_gazes(&self, gazes: &[Gaze]) -> Self {
         let density = self.viewing.display.pixel_density();
@@ -197,7 +200,8 @@ impl ThresholdMap {
         self.levels.get(self.levels.len() / 2)
     }
 
-    /// A chromatic channel's noise gain for the eye that these thresholds are of; `sensitivity_at` is the channel's own.
+    /// A chromatic channel's noise gain for the eye that these thresholds are of; `sensitivity_at` is the channel's
+    /// own.
     pub(crate) fn seen_from_gaze(
         &self,
         gain: Plane,
@@ -252,8 +256,8 @@ mod tests {
         assert!((f64::from(plane.get(2000, 1)) + GAZE_MARGIN_DEG - slanted).abs() < 1e-3);
     }
 
-    /// At the gaze nothing changes; away from it white noise may be as strong as the formula says of the frequencies that
-    /// carry it, and the measured error says the same as the prediction.
+    /// At the gaze nothing changes; away from it white noise may be as strong as the formula says of the frequencies
+    /// that carry it, and the measured error says the same as the prediction.
     #[test]
     fn thresholds_rise_away_from_the_gaze() {
         let viewing =

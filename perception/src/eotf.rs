@@ -41,9 +41,9 @@ const PQ_C3: f64 = 2392.0 / 4096.0 * 32.0;
 impl Eotf {
     /// Code value (clamped to 0..1) of linear light `relative` (1 = display white, which has `white_cd_m2`).
     ///
-    /// Only [`Eotf::Pq`] needs `white_cd_m2`: its codes mean absolute luminances, and light of 0 is none. For a display whose black
-    /// is brighter than that, encode what it emits over its white ([`Display::emitted_cd_m2`](crate::Display::emitted_cd_m2)). NaN
-    /// gives 0.
+    /// Only [`Eotf::Pq`] needs `white_cd_m2`: its codes mean absolute luminances, and light of 0 is none. For a
+    /// display whose black is brighter than that, encode what it emits over its white
+    /// ([`Display::emitted_cd_m2`](crate::Display::emitted_cd_m2)). NaN gives 0.
     #[must_use]
     pub fn encode(self, relative: f64, white_cd_m2: f64) -> f64 {
         let light = if relative.is_nan() { 0.0 } else { relative.clamp(0.0, 1.0) };

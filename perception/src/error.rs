@@ -4,8 +4,8 @@ use thiserror::Error;
 
 /// Why a question about a picture could not be answered.
 ///
-/// Sizes that do not fit, values outside a model's domain and malformed files end here. The few functions that want planes of one
-/// size and give no `Result` say so under "Panics".
+/// Sizes that do not fit, values outside a model's domain and malformed files end here. The few functions that want
+/// planes of one size and give no `Result` say so under "Panics".
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum Error {
     /// Two planes of one question have different sizes.

@@ -80,9 +80,9 @@ impl<'a> ErrorFilters<'a> {
     /// given for is the picture and as much around it as the pooling window reaches over: what an error at the border
     /// does to the eye, it does on both sides.
     ///
-    /// What changes slowly, the difference through a Gaussian of 1°, is mirrored all the same. With nothing at all outside, a picture
-    /// that is brighter as a whole would have an edge where it ends, which nobody sees: the display's surround is there, not a picture
-    /// that is equal.
+    /// What changes slowly, the difference through a Gaussian of 1°, is mirrored all the same. With nothing at all
+    /// outside, a picture that is brighter as a whole would have an edge where it ends, which nobody sees: the
+    /// display's surround is there, not a picture that is equal.
     pub(crate) fn amid_equals(map: &'a ThresholdMap) -> Self {
         Self::with_surround(map, Surround::SmoothMirror)
     }
@@ -223,8 +223,8 @@ impl<'a> ErrorFilters<'a> {
 }
 
 impl ThresholdMap {
-    /// Where an adaptation luminance stands between the levels: 1.25 is a quarter of the way, in luminance, from the second level
-    /// to the third.
+    /// Where an adaptation luminance stands between the levels: 1.25 is a quarter of the way, in luminance, from the
+    /// second level to the third.
     fn level_position(&self, adaptation_cd_m2: f32) -> f32 {
         let above = self.levels.partition_point(|level| level.luminance_cd_m2 <= adaptation_cd_m2);
         match (above.checked_sub(1), self.levels.get(above)) {

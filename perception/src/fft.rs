@@ -12,10 +12,11 @@ use crate::filter::reflect;
 use crate::frame::{Frame, MAX_REDUCTION};
 use crate::plane::Plane;
 
-/// Mirror on each side of a picture, degrees. The transform is periodic, so that a border's error reaches the opposite border across
-/// twice this. 512×512 pixels at 60 a degree, 2 cd/m² but for an error to 200 in the last degree, of which 0.8 is seen at the
-/// opposite border: 125.5 with a mirror of 1°, 13.6 with 2°, 0.74 with 3°. Padded it has 1.4 times the pixels of 1° at 2°,
-/// 2.3 times at 3°; at 2° the leak is 0.5 % of what is seen where the error stands.
+/// Mirror on each side of a picture, degrees. The transform is periodic, so that a border's error reaches the
+/// opposite border across twice this. 512×512 pixels at 60 a degree, 2 cd/m² but for an error to 200 in the last
+/// degree, of which 0.8 is seen at the opposite border: 125.5 with a mirror of 1°, 13.6 with 2°, 0.74 with 3°. Padded
+/// it has 1.4 times the pixels of 1° at 2°, 2.3 times at 3°; at 2° the leak is 0.5 % of what is seen where the error
+/// stands.
 const MIRROR_DEG: f64 = 2.0;
 /// The least, degrees, for pictures that are shorter than twice this.
 const MIN_MIRROR_DEG: f64 = 1.0;
@@ -38,8 +39,8 @@ pub(crate) struct Spectrum {
     bins: Vec<Complex32>,
 }
 
-/// Buffers that transforms of one picture hand on to each other: to have the memory made anew for every band would cost a
-/// tenth of a threshold map.
+/// Buffers that transforms of one picture hand on to each other: to have the memory made anew for every band would
+/// cost a tenth of a threshold map.
 #[derive(Default)]
 pub(crate) struct Workspace {
     by_column: Vec<Complex32>,
@@ -106,8 +107,8 @@ impl PictureTransform {
         }
     }
 
-    /// The frame of samples at every `factor`-th pixel, and at least so many more beside and above the picture as its mirror image in
-    /// the transform has room for, with every sample between them and one more of those on each side.
+    /// The frame of samples at every `factor`-th pixel, and at least so many more beside and above the picture as its
+    /// mirror image in the transform has room for, with every sample between them and one more of those on each side.
     pub(crate) fn mirrored_frame(&self, factor: usize, beside: f64, above: f64) -> Frame {
         let at_most = |wanted: f64, pad: usize| (wanted.ceil() as usize).min((2 * pad / factor).saturating_sub(3) / 2);
         Frame { factor, beside: at_most(beside, self.pad_x), above: at_most(above, self.pad_y) }
@@ -167,8 +168,8 @@ impl PictureTransform {
         Spectrum { bins }
     }
 
-    /// The picture whose spectrum is `spectrum` with every bin multiplied by `gain(freq_cpd)`, at every `factor`-th pixel
-    /// only, framed: see [`Frame`].
+    /// The picture whose spectrum is `spectrum` with every bin multiplied by `gain(freq_cpd)`, at every `factor`-th
+    /// pixel only, framed: see [`Frame`].
     ///
     /// `limit_cpd` is a frequency above which `gain` is zero (infinite if there is none): columns beyond it are not
     /// transformed. `factor` must be one of 1, 2, 4, 8, 16, and leave room for `limit_cpd`.
@@ -264,8 +265,8 @@ impl PictureTransform {
     }
 }
 
-/// Pixels of mirror at both ends of a line of `len`: a multiple of the largest reduction, so that reduced transforms sample the
-/// same pixels.
+/// Pixels of mirror at both ends of a line of `len`: a multiple of the largest reduction, so that reduced transforms
+/// sample the same pixels.
 fn mirror_px(len: usize, pixels_per_degree: f64) -> usize {
     let pixels = |degrees: f64| ((degrees * pixels_per_degree).ceil() as usize).max(1);
     len.div_ceil(2).clamp(pixels(MIN_MIRROR_DEG), pixels(MIRROR_DEG)).next_multiple_of(MAX_REDUCTION)
@@ -370,8 +371,8 @@ mod tests {
 
     #[test]
     fn frequencies_are_cycles_per_degree() {
-        // 3 cycles in 64 pixels at 32 pixels a degree: 1.5 cpd along y; with 16 pixels of mirror on each side, a third of
-        // the padded 96 rows is still whole half waves.
+        // 3 cycles in 64 pixels at 32 pixels a degree: 1.5 cpd along y; with 16 pixels of mirror on each side, a
+        // third of the padded 96 rows is still whole half waves.
         let plane = Plane::from_fn(16, 64, |_, y| (std::f32::consts::TAU * 3.0 * (y as f32 + 0.5) / 64.0).cos());
         let transform = transform_at(16, 64, 32.0);
         let spectrum = spectrum_of(&transform, &plane);

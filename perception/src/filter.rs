@@ -1,7 +1,7 @@
 //! Windows that slide over a picture: Gaussian blur and erosion, reflected at the borders.
 //!
-//! All cost the same whatever the window's size, but for the Gaussian by its own samples, and none subtracts: a running sum that takes a
-//! firefly of 1e20 back out would leave its rounding error all along the row.
+//! All cost the same whatever the window's size, but for the Gaussian by its own samples, and none subtracts: a
+//! running sum that takes a firefly of 1e20 back out would leave its rounding error all along the row.
 
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -40,11 +40,13 @@ pub(crate) fn gaussian_blur_xy(plane: &Plane, sigma_px: [f64; 2]) -> Plane {
     })
 }
 
-/// Below, a pixel is wider than what would be sampled; above are thousands of taps, and no eye's loss of acuity: the dimmest has 0.6°.
+/// Below, a pixel is wider than what would be sampled; above are thousands of taps, and no eye's loss of acuity: the
+/// dimmest has 0.6°.
 const SAMPLED_SIGMAS_PX: std::ops::RangeInclusive<f64> = 0.5..=500.0;
 
-/// [`gaussian_blur_xy`] by the Gaussian's own samples, for where what is left of a grating matters and not the width alone: of one
-/// of which a Gaussian leaves 0.0096 three boxes leave 0.0001. It has boxes outside [`SAMPLED_SIGMAS_PX`].
+/// [`gaussian_blur_xy`] by the Gaussian's own samples, for where what is left of a grating matters and not the width
+/// alone: of one of which a Gaussian leaves 0.0096 three boxes leave 0.0001. It has boxes outside
+/// [`SAMPLED_SIGMAS_PX`].
 pub(crate) fn sampled_gaussian_blur_xy(plane: &Plane, sigma_px: [f64; 2]) -> Plane {
     if !sigma_px.iter().all(|sigma_px| SAMPLED_SIGMAS_PX.contains(sigma_px)) {
         return gaussian_blur_xy(plane, sigma_px);
@@ -55,7 +57,8 @@ pub(crate) fn sampled_gaussian_blur_xy(plane: &Plane, sigma_px: [f64; 2]) -> Pla
     })
 }
 
-/// Blurs along both axes, over reduced rows where the window is wide: `window_for` a standard deviation, of the row as it then is.
+/// Blurs along both axes, over reduced rows where the window is wide: `window_for` a standard deviation, of the row
+/// as it then is.
 fn blurred_by<Window: Fn(&mut Strip) + Sync>(
     plane: &Plane,
     [sigma_x_px, sigma_y_px]: [f64; 2],
@@ -79,7 +82,8 @@ fn blurred_by<Window: Fn(&mut Strip) + Sync>(
     along_both_axes(plane, |len| blurred(sigma_y_px, len), |len| blurred(sigma_x_px, len))
 }
 
-/// What the squared weights sum to by which [`gaussian_blur`] makes each pixel of a row: one over the number of pixels that count.
+/// What the squared weights sum to by which [`gaussian_blur`] makes each pixel of a row: one over the number of
+/// pixels that count.
 ///
 /// Σ_j k(x, j)² is the mirrored window of σ√2 at the pixel itself, as a sum over the pixel's mirror images.
 pub(crate) fn squared_weights(sigma_px: f64, len: usize) -> Vec<f32> {

@@ -7,8 +7,8 @@ use crate::plane::Plane;
 /// The largest factor.
 pub(crate) const MAX_REDUCTION: usize = 16;
 
-/// Where the samples of a reduced picture stand: at every `factor`-th pixel, from one sample before the picture on until at least
-/// one past it, and so many more on each side as `beside` and `above` say.
+/// Where the samples of a reduced picture stand: at every `factor`-th pixel, from one sample before the picture on
+/// until at least one past it, and so many more on each side as `beside` and `above` say.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame {
     pub(crate) factor: usize,

@@ -1,12 +1,13 @@
 //! Glare: the veil that bright things lay over their surroundings, scattered by the eye's own lens and fluids.
 //!
-//! Off unless the observer asks for it ([`crate::display::Glare`]): left out, thresholds near lamps come out lower, which is safe.
-//! The veil is light like any other to the retina: it adds to the adaptation luminance, and since contrast is taken over
-//! that, it takes from contrast.
+//! Off unless the observer asks for it ([`crate::display::Glare`]): left out, thresholds near lamps come out lower,
+//! which is safe. The veil is light like any other to the retina: it adds to the adaptation luminance, and since
+//! contrast is taken over that, it takes from contrast.
 //!
-//! Contrast sensitivity was measured on uniform fields, whose own scatter is already in the data. So only what exceeds the veil
-//! of a field as bright as the place itself counts: K ⊗ (L − `L_a`) where it is positive. A uniform picture has no veil, and a
-//! window never lowers a threshold. Beyond the picture's edge all is taken to be as bright as the place itself.
+//! Contrast sensitivity was measured on uniform fields, whose own scatter is already in the data. So only what
+//! exceeds the veil of a field as bright as the place itself counts: K ⊗ (L − `L_a`) where it is positive. A uniform
+//! picture has no veil, and a window never lowers a threshold. Beyond the picture's edge all is taken to be as bright
+//! as the place itself.
 
 use rustfft::num_complex::Complex32;
 
@@ -18,7 +19,8 @@ use crate::sensitivity::luminance_coordinate;
 use crate::table::Between;
 use crate::threshold::ThresholdMap;
 
-/// Angles the formula holds for, degrees: closer in, scatter is part of the eye's point spread and of its contrast sensitivity.
+/// Angles the formula holds for, degrees: closer in, scatter is part of the eye's point spread and of its contrast
+/// sensitivity.
 const VALID_DEG: std::ops::Range<f64> = 0.1..100.0;
 /// Pigment of the eye: 0 for black, 0.5 for brown, 1.2 for light blue eyes.
 const PIGMENT: f64 = 0.5;
@@ -29,8 +31,8 @@ const MAX_CELLS: usize = 1024;
 
 /// Veil in cd/m² that an illuminance of 1 lx from `angle_deg` off the line of sight lays over it.
 ///
-/// CIE general disability glare equation (CIE 135/1-1999; Vos and van den Berg): 10/θ³ + (5/θ² + 0.1 p/θ)(1 + (A/62.5)⁴) +
-/// 0.0025 p for 0.1° < θ < 100°, age A in years, pigment p = 0.5 (brown eyes). 0 outside.
+/// CIE general disability glare equation (CIE 135/1-1999; Vos and van den Berg): 10/θ³ + (5/θ² + 0.1 p/θ)(1 +
+/// (A/62.5)⁴) + 0.0025 p for 0.1° < θ < 100°, age A in years, pigment p = 0.5 (brown eyes). 0 outside.
 #[must_use]
 pub fn veil_per_lux(angle_deg: f64, age_years: f64) -> f64 {
     if !VALID_DEG.contains(&angle_deg) {
@@ -47,8 +49,8 @@ pub(crate) struct Veil {
     cell: [usize; 2],
 }
 
-/// The veil over a picture, cd/m², beyond that of a uniform field of the adaptation luminance; `None` if the observer's eye is
-/// taken as clear.
+/// The veil over a picture, cd/m², beyond that of a uniform field of the adaptation luminance; `None` if the
+/// observer's eye is taken as clear.
 pub(crate) fn veil_cd_m2(luminance_cd_m2: &Plane, adaptation_cd_m2: &Plane, viewing: &Viewing) -> Option<Veil> {
     let Glare::Cie { age_years } = viewing.observer.glare else { return None };
     let density = viewing.display.pixel_density();
@@ -57,8 +59,8 @@ pub(crate) fn veil_cd_m2(luminance_cd_m2: &Plane, adaptation_cd_m2: &Plane, view
         ((pixels_per_degree / CELLS_PER_DEGREE) as usize).max(len.div_ceil(MAX_CELLS)).max(1)
     });
     let cells = (width.div_ceil(cell[0]), height.div_ceil(cell[1]));
-    // Real part: light over its mean; imaginary part: area. One complex transform convolves both, and each leaks into the other by
-    // rounding: at 1e8 cd/m² light itself would leave twice its own luminance where there is no veil.
+    // Real part: light over its mean; imaginary part: area. One complex transform convolves both, and each leaks into
+    // the other by rounding: at 1e8 cd/m² light itself would leave twice its own luminance where there is no veil.
     let mean = (luminance_cd_m2.mean() as f32).max(f32::MIN_POSITIVE);
     let sides = [smooth_size(2 * cells.0), smooth_size(2 * cells.1)];
     let mut light_and_area = Grid::new(sides);
@@ -86,8 +88,9 @@ pub(crate) fn veil_cd_m2(luminance_cd_m2: &Plane, adaptation_cd_m2: &Plane, view
     Some(Veil { cells: veil, cell })
 }
 
-/// Raises what a veil lowered. Veiled texture masks less, and where the mask is taken from beside a place (see [`crate::masking`])
-/// the place's own veil may not make up for it: up to 1.3 % of a threshold. No band's threshold falls below `clear`'s.
+/// Raises what a veil lowered. Veiled texture masks less, and where the mask is taken from beside a place (see
+/// [`crate::masking`]) the place's own veil may not make up for it: up to 1.3 % of a threshold. No band's threshold
+/// falls below `clear`'s.
 pub(crate) fn keep_thresholds(veiled: &mut ThresholdMap, clear: &ThresholdMap) {
     for (band, elevation) in veiled.elevations.iter_mut().enumerate() {
         let energy = &veiled.tables.bands[band].noise_energy;

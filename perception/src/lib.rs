@@ -1,21 +1,23 @@
 //! What an eye can see in a picture.
 //!
 //! Given a picture in cd/m², a [`Display`] and an [`Observer`], this crate says how much error each pixel may have
-//! before it is seen ([`threshold_map`]), how visible a given error is ([`ThresholdMap::measured_visibility`]) or will be
-//! ([`ThresholdMap::predicted_visibility`]), and what the picture looks like on the display ([`tone`]). It knows nothing of
-//! rays: the picture may come from any renderer or camera.
+//! before it is seen ([`threshold_map`]), how visible a given error is ([`ThresholdMap::measured_visibility`]) or
+//! will be ([`ThresholdMap::predicted_visibility`]), and what the picture looks like on the display ([`tone`]). It
+//! knows nothing of rays: the picture may come from any renderer or camera.
 //!
 //! # Units and shapes
 //!
 //! Nothing unitless enters: luminances are cd/m², frequencies cycles per degree (cpd), resolutions pixels per degree
-//! (ppd), velocities degrees per second, areas square degrees. Errors come out in threshold units: an error of [`visibility`] 1
-//! is at its threshold. Pictures are [`Plane`]s, row-major from the top left, one value a pixel; colour is a slice of linear
-//! Rec. 709 `[f32; 3]`. Sizes from 1×1 on, and any finite luminance from 0 to 1e8 cd/m², give finite answers; whatever cannot be
-//! answered is an [`Error`] that says what would be right. Results do not depend on the number of threads.
+//! (ppd), velocities degrees per second, areas square degrees. Errors come out in threshold units: an error of
+//! [`visibility`] 1 is at its threshold. Pictures are [`Plane`]s, row-major from the top left, one value a pixel;
+//! colour is a slice of linear Rec. 709 `[f32; 3]`. Sizes from 1×1 on, and any finite luminance from 0 to 1e8 cd/m²,
+//! give finite answers; whatever cannot be answered is an [`Error`] that says what would be right. Results do not
+//! depend on the number of threads.
 //!
 //! # A picture, and the noise in it
 //!
-//! Scene luminance goes through a [`tone`] operator onto a [`Display`] ([`seen`]), for all that is judged is what an eye sees:
+//! Scene luminance goes through a [`tone`] operator onto a [`Display`] ([`seen`]), for all that is judged is what an
+//! eye sees:
 //!
 //! ```
 //! use fechner_perception::{CastleCsf, Display, Plane, ThresholdInputs, Viewing, seen, threshold_map, tone};
@@ -37,22 +39,24 @@
 //! # Ok::<(), fechner_perception::Error>(())
 //! ```
 //!
-//! A picture that is noisy itself is first denoised into a [`guide`], whose variance is given along ([`GuideNoise`]), so that noise does
-//! not hide noise. Colour noise is judged by [`colour`], error that moves by [`motion`], and what draws the eye by [`saliency`].
+//! A picture that is noisy itself is first denoised into a [`guide`], whose variance is given along ([`GuideNoise`]),
+//! so that noise does not hide noise. Colour noise is judged by [`colour`], error that moves by [`motion`], and what
+//! draws the eye by [`saliency`].
 //!
 //! # A denoised picture
 //!
-//! [`denoised`] says what can be seen of the noise that a denoiser left and of what it changed, from the two halves of a path
-//! tracer's samples, and where raw noise is too strong to tell.
+//! [`denoised`] says what can be seen of the noise that a denoiser left and of what it changed, from the two halves
+//! of a path tracer's samples, and where raw noise is too strong to tell.
 //!
 //! # Where the samples should go
 //!
-//! [`allocation::allocate`] finds the cheapest sample counts that leave a chosen visibility, and a bound that says how far from
-//! the best they are.
+//! [`allocation::allocate`] finds the cheapest sample counts that leave a chosen visibility, and a bound that says
+//! how far from the best they are.
 //!
 //! # Two pictures
 //!
-//! [`difference::difference`] and [`difference::colour_difference`] say whether two pictures can be told apart, and where:
+//! [`difference::difference`] and [`difference::colour_difference`] say whether two pictures can be told apart, and
+//! where:
 //!
 //! ```
 //! use fechner_perception::difference::difference;
@@ -68,8 +72,9 @@
 //!
 //! # Eyes and models
 //!
-//! The [`display::Observer`] says how keen the eye is and whether it scatters light ([`glare`]). Contrast sensitivity functions
-//! stand behind one trait in [`csf`], threshold models from the literature behind another in [`model`]; both are found by name:
+//! The [`display::Observer`] says how keen the eye is and whether it scatters light ([`glare`]). Contrast sensitivity
+//! functions stand behind one trait in [`csf`], threshold models from the literature behind another in [`model`];
+//! both are found by name:
 //!
 //! ```
 //! use fechner_perception::display::{Glare, Observer};

@@ -21,8 +21,8 @@ pub const ELEVATION_CAP: f64 = 3.0;
 
 /// Threshold elevation T_e = (1 + |m|^2.8)^(1/4) by a mask of contrast `mask` in threshold units.
 ///
-/// Daly, "The visible differences predictor", 1993, with slope s = 0.7; with s = Q = 0.7 his constants k₁ and k₂ cancel.
-/// Not capped.
+/// Daly, "The visible differences predictor", 1993, with slope s = 0.7; with s = Q = 0.7 his constants k₁ and k₂
+/// cancel. Not capped.
 #[must_use]
 pub fn threshold_elevation(mask: f64) -> f64 {
     (1.0 + mask.abs().powf(2.8)).powf(0.25)
@@ -62,8 +62,8 @@ pub(crate) struct MaskSource<'a> {
     pub(crate) sensitivity: Option<&'a RadialTable>,
     /// [`ContrastSensitivity::transfer`]: what takes detail away before the eye takes it from masks, and from the guide's noise in them.
     pub(crate) csf: &'a dyn ContrastSensitivity,
-    /// Variance of the guide's noise over the adaptation luminance squared, as far as it is known: at every second pixel, every
-    /// fourth and so on, framed like any [`ReducedPlane`].
+    /// Variance of the guide's noise over the adaptation luminance squared, as far as it is known: at every second
+    /// pixel, every fourth and so on, framed like any [`ReducedPlane`].
     pub(crate) noise: GuideNoise<Vec<Plane>>,
     /// Coordinates of the adaptation luminance in the tables, at every second pixel.
     pub(crate) coordinates: &'a Plane,
@@ -80,22 +80,23 @@ pub(crate) struct MaskSource<'a> {
 /// it.
 const REACH_WAVELENGTHS: f64 = std::f64::consts::SQRT_2;
 
-/// Standard deviation of the window that softens the eroded elevation, in wavelengths: less than half of what the erosion takes off, so that
-/// nothing reaches what it has cleared.
+/// Standard deviation of the window that softens the eroded elevation, in wavelengths: less than half of what the
+/// erosion takes off, so that nothing reaches what it has cleared.
 const EDGE_WAVELENGTHS: f64 = 0.25;
 
-/// How far around the picture its mirror image is worked on, in wavelengths, where the transform has as much of it: what the windows
-/// and the erosion reach over. Each of them mirrors what it is given, too, but at a sample and not where the picture
-/// ends. Measured with that alone on 96×96 pixels of noise: thresholds in the first and the last rows 5 % off those of
-/// the mirrored picture.
+/// How far around the picture its mirror image is worked on, in wavelengths, where the transform has as much of it:
+/// what the windows and the erosion reach over. Each of them mirrors what it is given, too, but at a sample and not
+/// where the picture ends. Measured with that alone on 96×96 pixels of noise: thresholds in the first and the last
+/// rows 5 % off those of the mirrored picture.
 const SURROUND_WAVELENGTHS: f64 = 2.0;
 
 /// Threshold elevation, 1 to 3, of one band, on a grid as fine as the band needs.
 ///
 /// The band's local contrast amplitude is √2 times its RMS over a Gaussian of a third of a wavelength (the band's
-/// signal itself crosses zero twice a wavelength), less the energy that the guide's own noise has there, as far as [`GuideNoise`]
-/// tells. It is then eroded over more than one wavelength around: an edge, whose contrast lives within a wavelength, masks nothing
-/// beside it; texture, which goes on, does. Where it does ends softly, well within what the erosion has left.
+/// signal itself crosses zero twice a wavelength), less the energy that the guide's own noise has there, as far as
+/// [`GuideNoise`] tells. It is then eroded over more than one wavelength around: an edge, whose contrast lives within
+/// a wavelength, masks nothing beside it; texture, which goes on, does. Where it does ends softly, well within what
+/// the erosion has left.
 pub(crate) fn band_elevation(
     source: &MaskSource<'_>,
     workspace: &mut Workspace,
@@ -252,8 +253,8 @@ pub(crate) fn halvings(plane: &Plane) -> Vec<Plane> {
 /// Variance of the window of [`halved`], in samples of its input.
 const HALVING_VARIANCE: f64 = 0.5;
 
-/// `change` of every second sample of a plane, from its second one on, to a plane of `size`: through a binomial window, since sampled
-/// bare it would alias.
+/// `change` of every second sample of a plane, from its second one on, to a plane of `size`: through a binomial
+/// window, since sampled bare it would alias.
 fn halved(plane: &Plane, size: (usize, usize), change: impl Fn(f32) -> f32 + Sync) -> Plane {
     const BINOMIAL: [f32; 3] = [0.25, 0.5, 0.25];
     let mut result = Plane::filled(size.0, size.1, 0.0);

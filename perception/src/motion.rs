@@ -63,8 +63,8 @@ impl ErrorMotion {
     }
 }
 
-/// Speed over the picture, deg/s, of motion in pixels a frame, on a flat display of these frames a second and pixels a degree whose middle is
-/// that of the picture ([`FlatDisplay`]).
+/// Speed over the picture, deg/s, of motion in pixels a frame, on a flat display of these frames a second and pixels
+/// a degree whose middle is that of the picture ([`FlatDisplay`]).
 ///
 /// Each pixel takes the slowest speed of its 3×3 neighbourhood: at a silhouette the slower side's error is the one that
 /// could be seen. Motion that is not finite counts as none.
@@ -121,14 +121,17 @@ impl VelocityTable {
 
 impl ThresholdMap {
     /// Thresholds of noise that is new in every frame, for eyes that move at `eye_velocity_deg_s` at each place (see
-    /// [`eye_velocity_deg_s`]; at most 80 deg/s counts): each frame is smeared over the retina while the display holds it.
+    /// [`eye_velocity_deg_s`]; at most 80 deg/s counts): each frame is smeared over the retina while the display
+    /// holds it.
     ///
-    /// Only for thresholds of fresh noise ([`crate::csf::FreshNoise`] with the same timing), and only where eyes do move: a viewer
-    /// who looks elsewhere sees the noise as at rest. Each band's threshold is raised by what is left of the energy at its centre
-    /// under the middle one of the picture's adaptation levels. Colour is left as at rest, which sees more.
+    /// Only for thresholds of fresh noise ([`crate::csf::FreshNoise`] with the same timing), and only where eyes do
+    /// move: a viewer who looks elsewhere sees the noise as at rest. Each band's threshold is raised by what is left
+    /// of the energy at its centre under the middle one of the picture's adaptation levels. Colour is left as at
+    /// rest, which sees more.
     ///
     /// # Errors
-    /// [`Error::SizeMismatch`] and [`Error::BadPixel`] for velocities that do not fit, [`Error::OutOfRange`] for an impossible timing.
+    /// [`Error::SizeMismatch`] and [`Error::BadPixel`] for velocities that do not fit, [`Error::OutOfRange`] for an
+    /// impossible timing.
     pub fn with_pursuit(&self, eye_velocity_deg_s: &Plane, timing: FrameTiming) -> Result<Self, Error> {
         eye_velocity_deg_s.check_size("velocity", self.width(), self.height())?;
         eye_velocity_deg_s.check_non_negative("velocity")?;
@@ -172,8 +175,8 @@ mod tests {
         assert!(image_velocity_deg_s(&wide, &narrow, &Display::default()).is_err());
     }
 
-    /// By the angle between where something is seen half a frame before and after: of 3840 columns at 30 to a degree the border is 48° from the
-    /// middle, where a pan is 0.44 of its speed and a tilt 0.67.
+    /// By the angle between where something is seen half a frame before and after: of 3840 columns at 30 to a degree
+    /// the border is 48° from the middle, where a pan is 0.44 of its speed and a tilt 0.67.
     #[test]
     fn borders_of_wide_displays_are_slower() {
         let display = Display { pixels_per_degree: 30.0, frames_per_second: 24.0, ..Display::default() };
@@ -219,7 +222,8 @@ mod tests {
         assert!((ErrorMotion::Locked.retinal_velocity_deg_s(0.0, 1.0).unwrap() - 0.15).abs() < 1e-9);
     }
 
-    /// Noise at 24 frames a second that is at threshold for a resting eye may have so many times the variance for one that follows.
+    /// Noise at 24 frames a second that is at threshold for a resting eye may have so many times the variance for one
+    /// that follows.
     #[test]
     fn pursuit_lets_fresh_noise_be_stronger() {
         let timing = FrameTiming { frames_per_second: 24.0, persistence: 1.0 };

@@ -1,7 +1,7 @@
 //! Tables of what is found by name: one line a thing, so that a name and what it stands for cannot part.
 //!
-//! For the few names of a command line, which are searched from the first to the last. Not for names that files bring by
-//! the thousand.
+//! For the few names of a command line, which are searched from the first to the last. Not for names that files bring
+//! by the thousand.
 
 /// A table of things by name, in the order in which names are listed.
 pub(crate) type NamedTable<T, const N: usize> = [(&'static str, T); N];

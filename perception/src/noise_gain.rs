@@ -5,8 +5,8 @@ use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
 use crate::sensitivity::{SensitivityTables, luminance_coordinate};
 
-/// N = Σ_b E_b(`L_a`) / (`m_b` `L_a`)² at every pixel, with E_b the energy that white noise has in band b and `m_b` the band's
-/// elevation (1 if `elevations` is empty).
+/// N = Σ_b E_b(`L_a`) / (`m_b` `L_a`)² at every pixel, with E_b the energy that white noise has in band b and `m_b`
+/// the band's elevation (1 if `elevations` is empty).
 ///
 /// The sum changes as slowly as the elevations and the adaptation do: it is made on the finest grid of elevations and
 /// interpolated; only the division by `L_a`² is every pixel's own.
@@ -32,7 +32,8 @@ pub(crate) fn noise_gain(tables: &SensitivityTables, adaptation_cd_m2: &Plane, e
     let mut gain = Plane::filled(width, height, 0.0);
     gain.for_each_row_mut(|y, row| {
         energy.row_into(y, &mut Vec::new(), row);
-        // Divided twice: the square of 1e-4 cd/m² and of 1e20 must both stay within f32. Beyond, thresholds are the largest finite ones.
+        // Divided twice: the square of 1e-4 cd/m² and of 1e20 must both stay within f32. Beyond, thresholds are the
+        // largest finite ones.
         for (value, adaptation) in row.iter_mut().zip(adaptation_cd_m2.row(y)) {
             *value = (*value / adaptation / adaptation).max(f32::MIN_POSITIVE);
         }

@@ -25,7 +25,8 @@ const CONES: [[f64; 3]; 3] = cone_matrix();
 
 /// Rows achromatic, red–green and yellow–violet of linear Rec. 709 RGB: [`opponent`] as a matrix, for sums in `f64`.
 ///
-/// The chromatic mechanisms are castleCSF's (Ashraf et al. 2024): L − (L/M of white) M and (L+M)/S of white · S − (L + M).
+/// The chromatic mechanisms are castleCSF's (Ashraf et al. 2024): L − (L/M of white) M and (L+M)/S of white · S − (L
+/// + M).
 pub const OPPONENT_OF_RGB: [[f64; 3]; 3] = opponent_matrix();
 
 const fn cone_matrix() -> [[f64; 3]; 3] {

@@ -3,8 +3,8 @@
 use crate::frame::{enlarged, reduced_pixel};
 use crate::plane::Plane;
 
-/// Values at every `factor`-th pixel, one before the picture and at least one past it included, and straight lines between
-/// them: sample j stands at pixel (j − 1) · `factor`.
+/// Values at every `factor`-th pixel, one before the picture and at least one past it included, and straight lines
+/// between them: sample j stands at pixel (j − 1) · `factor`.
 #[derive(Clone, Debug)]
 pub(crate) struct ReducedPlane {
     samples: Plane,
@@ -49,8 +49,8 @@ impl ReducedPlane {
         self.factor
     }
 
-    /// Writes row `j` of the same map with a sample at every `factor`-th pixel, its frame of one included; `factor` divides
-    /// this map's own. `buffer` is any vector, to be used again.
+    /// Writes row `j` of the same map with a sample at every `factor`-th pixel, its frame of one included; `factor`
+    /// divides this map's own. `buffer` is any vector, to be used again.
     pub(crate) fn finer_row_into(&self, factor: usize, j: usize, buffer: &mut Vec<f32>, row: &mut [f32]) {
         let ratio = self.factor / factor;
         // Fine sample j stands (j − 1) / ratio of a step past coarse sample 1.

@@ -1,8 +1,8 @@
 //! Saliency: what of a picture attracts the gaze.
 //!
-//! Itti, Koch and Niebur, "A model of saliency-based visual attention for rapid scene analysis", IEEE PAMI 20(11), 1998:
-//! centre–surround differences of intensity, opponent colour and orientation over a pyramid; and of motion, as Yee,
-//! Pattanaik and Greenberg added in 2001.
+//! Itti, Koch and Niebur, "A model of saliency-based visual attention for rapid scene analysis", IEEE PAMI 20(11),
+//! 1998: centre–surround differences of intensity, opponent colour and orientation over a pyramid; and of motion, as
+//! Yee, Pattanaik and Greenberg added in 2001.
 //!
 //! It is of what draws the eye by itself, and knows no task, no faces and no text. Not for thresholds of stills:
 //! attention decides what moving things the eye follows ([`crate::motion`]), and changes nothing where nothing moves.
@@ -22,8 +22,8 @@ pub struct SaliencyInputs<'a> {
     pub velocity: Option<&'a Plane>,
 }
 
-/// Saliency of a moving picture as a display sends it to the eye: RGB in cd/m², row by row, `width` pixels wide, and speed over the
-/// picture in any unit.
+/// Saliency of a moving picture as a display sends it to the eye: RGB in cd/m², row by row, `width` pixels wide, and
+/// speed over the picture in any unit.
 ///
 /// # Errors
 /// As [`saliency`].
@@ -256,9 +256,10 @@ fn add(sum: &mut Plane, other: &Plane) {
     }
 }
 
-/// Blurred, and every second pixel of it, both ends alike: an even row by the binomial kernel (1, 3, 3, 1)/8, each pixel between two, an
-/// odd one by (1, 8, 14, 8, 1)/32, which has the same variance, from its first pixel to its last. So each level stands around
-/// the picture's middle (see [`resized`]), and a mirrored picture has the mirrored levels.
+/// Blurred, and every second pixel of it, both ends alike: an even row by the binomial kernel (1, 3, 3, 1)/8, each
+/// pixel between two, an odd one by (1, 8, 14, 8, 1)/32, which has the same variance, from its first pixel to its
+/// last. So each level stands around the picture's middle (see [`resized`]), and a mirrored picture has the mirrored
+/// levels.
 fn halved(plane: &Plane) -> Plane {
     const BETWEEN: &[f32] = &[0.125, 0.375, 0.375, 0.125];
     const AROUND: &[f32] = &[0.031_25, 0.25, 0.437_5, 0.25, 0.031_25];
@@ -281,8 +282,8 @@ struct Level {
     height: usize,
 }
 
-/// Bilinear interpolation of the scale `octave` to the pixels of another one, whose middles lie over one another; sides in proportion
-/// would move the levels of pictures that 256 does not divide against each other.
+/// Bilinear interpolation of the scale `octave` to the pixels of another one, whose middles lie over one another;
+/// sides in proportion would move the levels of pictures that 256 does not divide against each other.
 fn resized(plane: &Plane, octave: usize, to: Level) -> Plane {
     let ratio = (to.octave as f32 - octave as f32).exp2();
     let middle = |len: usize| 0.5 * (len - 1) as f32;
@@ -362,7 +363,8 @@ mod tests {
         assert!(map.get(40, 40) > 2.0 * map.get(200, 200));
     }
 
-    /// What is seen in a mirror attracts the eye in the mirror's place, and what moves as one piece has no part that stands out.
+    /// What is seen in a mirror attracts the eye in the mirror's place, and what moves as one piece has no part that
+    /// stands out.
     #[test]
     fn levels_lie_over_one_another() {
         let picture = |x: usize, y: usize| {

@@ -34,9 +34,9 @@ pub fn display_luminance_at(fitted: &dyn FittedTone, display: &Display, pixel: P
     Shown { fitted, display }.cd_m2(pixel, scene_cd_m2)
 }
 
-/// How much the displayed luminance changes with scene luminance around `scene_luminance` (cd/m²): the slope of the chord
-/// from 5 % below to 5 % above. Noise that is to stay without bias may not go through the operator itself, which is bent.
-/// Finite everywhere: luminance counts as at least 1e-4 and at most 1e30 cd/m², NaN as the least.
+/// How much the displayed luminance changes with scene luminance around `scene_luminance` (cd/m²): the slope of the
+/// chord from 5 % below to 5 % above. Noise that is to stay without bias may not go through the operator itself,
+/// which is bent. Finite everywhere: luminance counts as at least 1e-4 and at most 1e30 cd/m², NaN as the least.
 #[must_use]
 pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
@@ -52,19 +52,19 @@ pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance
 /// Variance of the displayed luminance, (cd/m²)², for scene luminance of mean `mean` (cd/m²) and variance `variance`
 /// ((cd/m²)², of the mean).
 ///
-/// Three-point quadrature of the operator, not its derivative: just above a clip the derivative is 0, and the noise is
-/// not. Where M ≥ √3 σ the points are those of Gauss and Hermite (M and M ± √3 σ); nearer to black, where light cannot
-/// go below 0, the lower point stays at 0 and the upper one moves out to M + 3σ²/M, which keeps mean and variance, and the
-/// square of what M + σ shows beside M has half of the say: where few samples brought the light, the variance is theirs, and
-/// σ is how far the mean is off by them, not 3σ²/M, which may be far above a clip. An operator that is linear over the
-/// points gives exactly its slope² · σ².
+/// Three-point quadrature of the operator, not its derivative: just above a clip the derivative is 0, and the noise
+/// is not. Where M ≥ √3 σ the points are those of Gauss and Hermite (M and M ± √3 σ); nearer to black, where light
+/// cannot go below 0, the lower point stays at 0 and the upper one moves out to M + 3σ²/M, which keeps mean and
+/// variance, and the square of what M + σ shows beside M has half of the say: where few samples brought the light,
+/// the variance is theirs, and σ is how far the mean is off by them, not 3σ²/M, which may be far above a clip. An
+/// operator that is linear over the points gives exactly its slope² · σ².
 ///
 /// Measured on a point lamp 6 cm below a ceiling at 16 samples a pixel (`benches/results/beyond-white.md`): visibility
 /// 19.7 ± 2.0 by the thresholds of the converged picture, 14 by comparison with it; predicted by the three points alone
 /// 10.8, by M + σ alone 26.2, by this rule 19.9.
 ///
-/// Where normal noise (√3 σ ≤ M) reaches over a clip of the display, three points see too much of it or nothing at all; there the
-/// operator is asked at 21 points, −4σ to 4σ.
+/// Where normal noise (√3 σ ≤ M) reaches over a clip of the display, three points see too much of it or nothing at
+/// all; there the operator is asked at 21 points, −4σ to 4σ.
 ///
 /// Pixels whose mean or variance is not finite get infinity; so does every pixel when the planes differ in size.
 #[must_use]
@@ -99,9 +99,9 @@ impl SceneColours<'_> {
     }
 }
 
-/// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², for those of the scene, `scene` ((cd/m²)², of the
-/// mean), on scene luminance `mean` (cd/m²): of each pixel as [`NoiseShown::opponent_variances`]. Every pixel gets infinity when the
-/// planes differ in size.
+/// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², for those of the scene, `scene`
+/// ((cd/m²)², of the mean), on scene luminance `mean` (cd/m²): of each pixel as [`NoiseShown::opponent_variances`].
+/// Every pixel gets infinity when the planes differ in size.
 #[must_use]
 pub fn display_opponent_variances(
     fitted: &dyn FittedTone,
@@ -153,11 +153,12 @@ impl<'a> NoiseShown<'a> {
         Self { shown: Shown { fitted, display }, rooms_cd_m2 }
     }
 
-    /// A pixel's variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², for those of the scene, `scene` ((cd/m²)², of
-    /// the mean), on scene luminance `mean` (cd/m²): of luminance as [`display_variance`]; of colour, by most operators, the greater of
-    /// two. One is what the operator leaves of tints, as far as there is room for them below the display's white, where every colour is
-    /// white; nothing is taken off at black, whose tints are small by themselves. The other is what becomes of a `colour` that fits the
-    /// display less, the brighter it is: red at half of white's luminance pales with each step towards it. An operator that knows the
+    /// A pixel's variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², for those of the scene,
+    /// `scene` ((cd/m²)², of the mean), on scene luminance `mean` (cd/m²): of luminance as [`display_variance`]; of
+    /// colour, by most operators, the greater of two. One is what the operator leaves of tints, as far as there is
+    /// room for them below the display's white, where every colour is white; nothing is taken off at black, whose
+    /// tints are small by themselves. The other is what becomes of a `colour` that fits the display less, the
+    /// brighter it is: red at half of white's luminance pales with each step towards it. An operator that knows the
     /// picture's colours ([`crate::tone::coloured()`]) is asked what it makes of them with noise.
     ///
     /// What is not finite, or of negative variance, gets infinity; colour also where luminance's variance is so.
@@ -204,8 +205,8 @@ pub fn display_opponent(fitted: &dyn FittedTone, display: &Display, pixel: Pixel
     Shown { fitted, display }.opponent(pixel, rgb_cd_m2)
 }
 
-/// How far a chromatic signal can go from a grey that is 1 below white, where white is 1: of red and green, or of violet and yellow,
-/// the one that fits better.
+/// How far a chromatic signal can go from a grey that is 1 below white, where white is 1: of red and green, or of
+/// violet and yellow, the one that fits better.
 fn room_of_tints(channel: ChromaticChannel) -> f64 {
     let weights = REC709_WEIGHTS.map(f64::from);
     // The first has its luminance taken from green: where green is the one that rises, so much more of it fits.
@@ -227,8 +228,8 @@ pub fn display_chromatic_slope(fitted: &dyn FittedTone, display: &Display, scene
     })
 }
 
-/// Half the difference that the two halves make on the display, cd/m²: (tone(M + D) − tone(M − D)) / 2 for the mean M and
-/// the half difference D = (A − B) / 2, both scene cd/m².
+/// Half the difference that the two halves make on the display, cd/m²: (tone(M + D) − tone(M − D)) / 2 for the mean M
+/// and the half difference D = (A − B) / 2, both scene cd/m².
 ///
 /// Pixels that are not finite give 0 (they are counted and left out upstream); planes of different sizes give infinity.
 #[must_use]
@@ -244,8 +245,8 @@ pub fn display_half_difference(
     })
 }
 
-/// `of` two planes' values at each pixel; `else_value` where they, or what becomes of them, are not finite. Planes of different
-/// sizes give infinity.
+/// `of` two planes' values at each pixel; `else_value` where they, or what becomes of them, are not finite. Planes of
+/// different sizes give infinity.
 fn by_pixel(first: &Plane, second: &Plane, else_value: f32, of: impl Fn(Pixel, f32, f32) -> f32 + Sync) -> Plane {
     if !first.same_size(second) {
         return Plane::filled(first.width(), first.height(), f32::INFINITY);
@@ -347,7 +348,8 @@ mod tests {
         squares / weights - (sum / weights).powi(2)
     }
 
-    /// Means from far below the clip at 200 cd/m² to above it, where three points give 0 from 1.8 σ on; and at black, 0.2 cd/m².
+    /// Means from far below the clip at 200 cd/m² to above it, where three points give 0 from 1.8 σ on; and at black,
+    /// 0.2 cd/m².
     #[test]
     fn noise_at_a_clip_has_the_variance_that_it_shows() {
         let display = Display::default();
@@ -384,7 +386,8 @@ mod tests {
         let pixel = Pixel { x: 0, y: 0 };
         let red_for_green = [1.0, -REC709_WEIGHTS[0] / REC709_WEIGHTS[1], 0.0];
         let signal = crate::opponent::opponent(red_for_green).red_green;
-        // An even spread over three standard deviations to each side has the variance of 3; steps far apart so that both are independent.
+        // An even spread over three standard deviations to each side has the variance of 3; steps far apart so that
+        // both are independent.
         let spread =
             |index: usize, step: usize| ((index * step % COLOURS) as f32 / COLOURS as f32 - 0.5) * 12.0_f32.sqrt();
         for (mean, deviation, tint) in

@@ -50,8 +50,9 @@ pub(crate) fn luminance_coordinate(luminance_cd_m2: f32) -> f32 {
     ((decades - LOWEST_DECADE as f32) * ENTRIES_PER_DECADE as f32).max(0.0)
 }
 
-/// Binary logarithm of a positive, normal number, off by less than 1e-6 beside rounding, without a call: every pixel of every
-/// map asks for it. The mantissa m, brought between √½ and √2, goes through the series of 2 artanh((m − 1)/(m + 1)) / ln 2.
+/// Binary logarithm of a positive, normal number, off by less than 1e-6 beside rounding, without a call: every pixel
+/// of every map asks for it. The mantissa m, brought between √½ and √2, goes through the series of 2 artanh((m −
+/// 1)/(m + 1)) / ln 2.
 fn log2(value: f32) -> f32 {
     const ROOT_HALF_BITS: u32 = 0x3f35_04f3;
     let bits = value.to_bits();
@@ -175,8 +176,8 @@ struct Ring {
     weight: f64,
 }
 
-/// Standard deviation along one axis of |h|², for the isotropic filter of transfer function `transfer` that passes nothing
-/// above `limit_cpd`: by Parseval, ∫ x² h² = ∫ |∂H/∂f|² / 4π², of which each axis has half.
+/// Standard deviation along one axis of |h|², for the isotropic filter of transfer function `transfer` that passes
+/// nothing above `limit_cpd`: by Parseval, ∫ x² h² = ∫ |∂H/∂f|² / 4π², of which each axis has half.
 fn spread_deg(limit_cpd: f64, transfer: impl Fn(f64) -> f64) -> f64 {
     const STEPS: u32 = 256;
     let step = limit_cpd / f64::from(STEPS);
@@ -204,8 +205,8 @@ pub(crate) struct AdaptationLevel {
 
 /// Half-decade adaptation levels that enclose `least..=greatest` cd/m².
 ///
-/// Between levels amplitudes are interpolated linearly in luminance: of castleCSF up to 30 cpd that is from 7 % too little to 10 % too much,
-/// against 24 % for decades and 124 % for decades interpolated in log luminance.
+/// Between levels amplitudes are interpolated linearly in luminance: of castleCSF up to 30 cpd that is from 7 % too
+/// little to 10 % too much, against 24 % for decades and 124 % for decades interpolated in log luminance.
 pub(crate) fn adaptation_levels(
     viewing: &Viewing,
     csf: &dyn ContrastSensitivity,

@@ -1,7 +1,7 @@
 //! Functions tabulated at equal steps, with straight lines between the entries.
 
-/// A table against a position that counts entries: 1.25 is a quarter of the way from the second one to the third. Beyond its ends it
-/// is flat.
+/// A table against a position that counts entries: 1.25 is a quarter of the way from the second one to the third.
+/// Beyond its ends it is flat.
 #[derive(Clone, Debug)]
 pub(crate) struct UniformTable(Vec<f32>);
 

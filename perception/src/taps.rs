@@ -1,5 +1,5 @@
-//! Small windows, tap by tap along whole rows, so that the loops run on vector registers. For windows of more than a few
-//! samples [`crate::filter`] costs less.
+//! Small windows, tap by tap along whole rows, so that the loops run on vector registers. For windows of more than a
+//! few samples [`crate::filter`] costs less.
 
 use crate::filter::{self, reflect};
 use crate::plane::Plane;
@@ -28,10 +28,12 @@ pub(crate) fn smoothed(plane: &Plane, variance_x: f64, variance_y: f64) -> Plane
     })
 }
 
-/// The smallest value of the samples whose middles lie within an ellipse around each sample, whose half-axes are these radii and half a
-/// sample: of a radius along an axis so many samples to each side, rounded. Round, so that a picture that is turned has a turned result.
+/// The smallest value of the samples whose middles lie within an ellipse around each sample, whose half-axes are
+/// these radii and half a sample: of a radius along an axis so many samples to each side, rounded. Round, so that a
+/// picture that is turned has a turned result.
 ///
-/// A column of the ellipse holds the rows of the one farther out, so that minima over rows are handed inwards from column to column.
+/// A column of the ellipse holds the rows of the one farther out, so that minima over rows are handed inwards from
+/// column to column.
 pub(crate) fn eroded(plane: &Plane, radius_x: f64, radius_y: f64) -> Plane {
     // Twice a mirrored picture shows nothing new.
     let half_axis = |radius: f64, len: usize| radius.clamp(0.0, 2.0 * len as f64) + 0.5;

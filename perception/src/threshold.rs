@@ -48,10 +48,11 @@ pub enum GuideNoise<V> {
     Clean,
     /// A picture that is not denoised, with white noise of this variance: its energy is taken out of masks.
     White(V),
-    /// A denoised picture, and the variance of its noise *before* denoising, taken as white. It bounds what is left, which is not white:
-    /// thresholds are raised by the geometric mean of what masks less all of it raise them by (at least) and what whole masks do (at
-    /// most). Of all estimates that were tried it scatters least over the picture. What is left of the noise hides some of itself: 5 % of
-    /// standard error on a flat wall at 16 samples, 15 % at 4 (`cargo bench -p fechner-perception --bench masking_bias`).
+    /// A denoised picture, and the variance of its noise *before* denoising, taken as white. It bounds what is left,
+    /// which is not white: thresholds are raised by the geometric mean of what masks less all of it raise them by (at
+    /// least) and what whole masks do (at most). Of all estimates that were tried it scatters least over the picture.
+    /// What is left of the noise hides some of itself: 5 % of standard error on a flat wall at 16 samples, 15 % at 4
+    /// (`cargo bench -p fechner-perception --bench masking_bias`).
     BeforeDenoising(V),
 }
 
@@ -94,11 +95,11 @@ pub struct ThresholdMap {
 /// Finds adaptation, masking and thresholds of a picture.
 ///
 /// Adaptation is the arithmetic mean over a Gaussian of σ 0.25° (the variance of a disc of 1°), after pixels that
-/// outshine all their neighbours, or all but one, have been brought down to the second brightest: a firefly must not raise what the
-/// eye adapts to.
-/// Masking is each octave band's own, see [`crate::masking`]. There lone bright pixels count as what they look like, glitter or
-/// stars, which do hide error: a single one of 100 times its grey raises the allowed error beside it up to 1.8 times. Where such
-/// pixels may be fireflies, give a guide without them, as [`crate::guide::denoise`] makes it.
+/// outshine all their neighbours, or all but one, have been brought down to the second brightest: a firefly must not
+/// raise what the eye adapts to. Masking is each octave band's own, see [`crate::masking`]. There lone bright pixels
+/// count as what they look like, glitter or stars, which do hide error: a single one of 100 times its grey raises the
+/// allowed error beside it up to 1.8 times. Where such pixels may be fireflies, give a guide without them, as
+/// [`crate::guide::denoise`] makes it.
 ///
 /// # Errors
 /// [`Error::Empty`] and [`Error::BadPixel`] for pictures that are none, [`Error::SizeMismatch`] for a variance of
@@ -131,9 +132,9 @@ pub fn threshold_map(
 
 /// Finds thresholds of one chromatic channel of a picture, to be asked about errors in that channel.
 ///
-/// `channel_cd_m2` is the channel's signal in the denoised guide and `display_luminance_cd_m2` the guide's luminance (both
-/// from [`crate::opponent::opponent`] of the displayed colours): adaptation comes from luminance, masking from the
-/// channel's own contrast. `csf` is the channel's, e.g. [`crate::csf::CastleChromatic`].
+/// `channel_cd_m2` is the channel's signal in the denoised guide and `display_luminance_cd_m2` the guide's luminance
+/// (both from [`crate::opponent::opponent`] of the displayed colours): adaptation comes from luminance, masking from
+/// the channel's own contrast. `csf` is the channel's, e.g. [`crate::csf::CastleChromatic`].
 ///
 /// # Errors
 /// As [`threshold_map`]; the channel's signal may be negative.
@@ -189,14 +190,15 @@ fn assemble(
     map
 }
 
-/// Bands of pictures up to this are worked on side by side: each by itself is too small for two cores (4.1 ms of threshold maps at
-/// 128×128 with one thread, 4.0 with two). Larger ones have rows enough, and every band at work has buffers of its own.
+/// Bands of pictures up to this are worked on side by side: each by itself is too small for two cores (4.1 ms of
+/// threshold maps at 128×128 with one thread, 4.0 with two). Larger ones have rows enough, and every band at work has
+/// buffers of its own.
 const FEW_PIXELS: usize = 1 << 16;
 
-/// Contrast of a mask, in adaptation luminances, beyond which more would mask no more (a few threshold units are the cap) and only
-/// cost the rest of the transform its precision. Measured without it, beside a lone lamp of 1e5 × white: rounding
-/// raises thresholds threefold all over the picture. Shown pictures stay below: a night view with lamps of 1000 × its
-/// black reaches 25.
+/// Contrast of a mask, in adaptation luminances, beyond which more would mask no more (a few threshold units are the
+/// cap) and only cost the rest of the transform its precision. Measured without it, beside a lone lamp of 1e5 ×
+/// white: rounding raises thresholds threefold all over the picture. Shown pictures stay below: a night view with
+/// lamps of 1000 × its black reaches 25.
 const MAX_MASK_CONTRAST: f32 = 30.0;
 
 /// Who looks, and what is tabulated of it.
@@ -207,8 +209,8 @@ struct Eye<'a> {
     tables: &'a SensitivityTables,
 }
 
-/// Masks and noise gain of a signal, cd/m², under an adaptation luminance. `mean` is about the mean of signal over adaptation:
-/// no band passes it, and without it the transform's precision is for the detail.
+/// Masks and noise gain of a signal, cd/m², under an adaptation luminance. `mean` is about the mean of signal over
+/// adaptation: no band passes it, and without it the transform's precision is for the detail.
 fn masked(
     signal_cd_m2: &Plane,
     mean: f32,
@@ -286,8 +288,9 @@ impl ThresholdMap {
     }
 
     /// How many times masking raises the allowed standard error of white noise at each pixel, 1 to 3. On a map
-    /// [`with_motion`](Self::with_motion) what motion raises or lowers is in it, too. So is, with [`Glare`], what keeps thresholds
-    /// from falling under a veil that is brighter than the picture: beside very bright lamps hundreds of times.
+    /// [`with_motion`](Self::with_motion) what motion raises or lowers is in it, too. So is, with [`Glare`], what
+    /// keeps thresholds from falling under a veil that is brighter than the picture: beside very bright lamps
+    /// hundreds of times.
     #[must_use]
     pub fn masking_elevation(&self) -> Plane {
         self.unmasked_noise_gain().combined(&self.noise_gain, |unmasked, masked| (unmasked / masked).sqrt())
@@ -309,8 +312,8 @@ impl ThresholdMap {
     /// [`crate::motion`]).
     ///
     /// Each band's threshold is raised, or at low frequencies lowered, by the ratio of Daly's 1998 spatiovelocity
-    /// sensitivity at rest to that in motion at the band's centre, kept within 0.1 and 20. What moves no faster than the eye drifts
-    /// keeps its thresholds.
+    /// sensitivity at rest to that in motion at the band's centre, kept within 0.1 and 20. What moves no faster than
+    /// the eye drifts keeps its thresholds.
     ///
     /// # Errors
     /// [`Error::SizeMismatch`] and [`Error::BadPixel`] for velocities that do not fit.
@@ -323,8 +326,8 @@ impl ThresholdMap {
             *elevation =
                 elevation.change_by(retinal_velocity_deg_s, |elevation, velocity| elevation * table.at(velocity));
         }
-        // The elevations that motion changes have every pixel's own value, the others' sum is interpolated (see `noise_gain`): up to
-        // 18 % between the two at the borders of masks, which is no motion.
+        // The elevations that motion changes have every pixel's own value, the others' sum is interpolated (see
+        // `noise_gain`): up to 18 % between the two at the borders of masks, which is no motion.
         let in_motion = noise_gain(&self.tables, &self.adaptation_cd_m2, &moved.elevations);
         moved.noise_gain = Plane::from_fn(self.width(), self.height(), |x, y| {
             let gain =

@@ -106,8 +106,8 @@ fn exp10(log: f64) -> f64 {
     10.0_f64.powf(log)
 }
 
-/// Highest frequency an eye adapted to `adaptation_cd_m2` resolves, cpd: Ward Larson et al.'s 1997 fit to Shlaer's data,
-/// 17.25 atan(1.4 log₁₀ L + 0.35) + 25.72.
+/// Highest frequency an eye adapted to `adaptation_cd_m2` resolves, cpd: Ward Larson et al.'s 1997 fit to Shlaer's
+/// data, 17.25 atan(1.4 log₁₀ L + 0.35) + 25.72.
 #[must_use]
 pub fn acuity_cpd(adaptation_cd_m2: f64) -> f64 {
     17.25 * (1.4 * log10(adaptation_cd_m2) + 0.35).atan() + 25.72

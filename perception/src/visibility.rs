@@ -47,8 +47,8 @@ impl ThresholdMap {
     /// Visibility that independent pixel errors of this variance ((cd/m²)² on the display, of the pixel's mean) will
     /// have, on average over noise.
     ///
-    /// v² = 2 g ⊗ Σ_b (mean(S² `B_b`²) / `m_b`²) · (`h_b`² ⊗ σ²/`L_a`²): each band smears the noise's energy by the width of its
-    /// own impulse response before masking acts.
+    /// v² = 2 g ⊗ Σ_b (mean(S² `B_b`²) / `m_b`²) · (`h_b`² ⊗ σ²/`L_a`²): each band smears the noise's energy by the
+    /// width of its own impulse response before masking acts.
     ///
     /// Pixels whose variance is negative or not finite get infinity and count as 0 for the others; a plane of another
     /// size gets infinity everywhere.
@@ -89,17 +89,19 @@ impl ThresholdMap {
     /// Visibility of the error that two halves of a picture show: `half_difference` is D = (A − B)/2 in display cd/m²,
     /// a realisation of the error of (A + B)/2, with whatever correlation between pixels it has.
     ///
-    /// D/`L_a` is filtered by the contrast sensitivity function of half-decade adaptation levels, interpolated linearly in
-    /// luminance, band by band; each band is divided by its masking; energies are added and pooled.
+    /// D/`L_a` is filtered by the contrast sensitivity function of half-decade adaptation levels, interpolated
+    /// linearly in luminance, band by band; each band is divided by its masking; energies are added and pooled.
     ///
-    /// Pixels that are not finite get infinity and count as 0 for the others; a plane of another size gets infinity everywhere.
+    /// Pixels that are not finite get infinity and count as 0 for the others; a plane of another size gets infinity
+    /// everywhere.
     #[must_use]
     pub fn measured_visibility(&self, half_difference: &Plane) -> Plane {
         self.pooled_error(ErrorFilters::new(self), half_difference)
             .map_or_else(|| self.infinite(), |error| error.visibility)
     }
 
-    /// [`ThresholdMap::measured_visibility`] of a difference that ends with the pictures (see [`ErrorFilters::amid_equals`]).
+    /// [`ThresholdMap::measured_visibility`] of a difference that ends with the pictures (see
+    /// [`ErrorFilters::amid_equals`]).
     pub(crate) fn visibility_amid_equals(&self, difference: &Plane) -> Plane {
         self.pooled_error(ErrorFilters::amid_equals(self), difference)
             .map_or_else(|| self.infinite(), |error| error.visibility)
@@ -131,8 +133,9 @@ impl ThresholdMap {
         self.blurred(plane, POOLING_SIGMA_DEG)
     }
 
-    /// How [`Self::pooled`] scatters of a plane whose pixels are independent and deviate from what they should be as `deviations` do, where
-    /// those change little over the window. The window's powers are windows themselves, 1/√2 and 1/√3 as wide.
+    /// How [`Self::pooled`] scatters of a plane whose pixels are independent and deviate from what they should be as
+    /// `deviations` do, where those change little over the window. The window's powers are windows themselves, 1/√2
+    /// and 1/√3 as wide.
     #[must_use]
     pub fn pooled_scatter(&self, deviations: &Plane) -> PooledScatter {
         let sigma_px = self.viewing.display.pixel_density().pixels(POOLING_SIGMA_DEG);
@@ -211,7 +214,8 @@ mod tests {
         });
     }
 
-    /// By the window's own weights, in the middle, at a border and in a corner. Three boxes are no Gaussian: 5 % of its cubes.
+    /// By the window's own weights, in the middle, at a border and in a corner. Three boxes are no Gaussian: 5 % of
+    /// its cubes.
     #[test]
     fn pooled_noise_scatters_as_the_window_weighs() {
         let (width, height) = (24, 16);

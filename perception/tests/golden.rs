@@ -40,7 +40,8 @@ fn peaks() {
             (csf.peak_cpd() / row[1] - 1.0).abs() < 1e-6 && (peak_sensitivity(&csf, 100.0) / row[2] - 1.0).abs() < 1e-6
         );
     }
-    // Section 3.3, 3.5 and 3.7: (luminance, peak) of Daly 1993, Barten 1999, castle and stela, to the digits printed there.
+    // Section 3.3, 3.5 and 3.7: (luminance, peak) of Daly 1993, Barten 1999, castle and stela, to the digits printed
+    // there.
     type Peaks<'a> = (&'a dyn ContrastSensitivity, &'a [(f64, f64)], f64);
     let peaks: [Peaks<'_>; 4] = [
         (

@@ -1,7 +1,8 @@
 //! Pictures between numpy and the crate.
 //!
-//! A C-contiguous, aligned `float32` array is read where it lies; anything else that numpy can turn into one is converted first.
-//! Pictures in colour reach the crate without a copy, single-channel ones by one copy into its [`Plane`]; results go back without.
+//! A C-contiguous, aligned `float32` array is read where it lies; anything else that numpy can turn into one is
+//! converted first. Pictures in colour reach the crate without a copy, single-channel ones by one copy into its
+//! [`Plane`]; results go back without.
 
 use fechner_perception::Plane;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};

@@ -1,7 +1,7 @@
 //! `fechner-perception` for Python.
 //!
-//! Arrays in, arrays out: no formula stands here. Every function reads its arguments, lets go of Python's lock, asks the crate
-//! and hands the answer's memory to numpy. What the crate rejects becomes a `ValueError` with its message.
+//! Arrays in, arrays out: no formula stands here. Every function reads its arguments, lets go of Python's lock, asks
+//! the crate and hands the answer's memory to numpy. What the crate rejects becomes a `ValueError` with its message.
 
 use pyo3::prelude::*;
 

@@ -10,7 +10,8 @@ use crate::arrays::{Pixels, Shape, plane, plane_to_array, rgb_to_array};
 use crate::errors::{check_size, try_work, value_error, work};
 use crate::viewing::{Viewing, or_default};
 
-/// Photopic luminance, (height, width), of linear Rec. 709 RGB, (height, width, 3), in the unit of `rgb`. NaN stays NaN.
+/// Photopic luminance, (height, width), of linear Rec. 709 RGB, (height, width, 3), in the unit of `rgb`. NaN stays
+/// NaN.
 #[pyfunction]
 pub(crate) fn luminance<'py>(py: Python<'py>, rgb: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let pixels = Pixels::borrow("rgb", rgb)?;
@@ -25,8 +26,8 @@ pub(crate) struct Difference(perception::Difference);
 
 /// Predicts what can be seen of the difference between two pictures as displayed.
 ///
-/// reference, test: both linear Rec. 709 RGB, (height, width, 3), or both luminance, (height, width); display cd/m². ValueError for
-/// pictures that cannot be compared.
+/// reference, test: both linear Rec. 709 RGB, (height, width, 3), or both luminance, (height, width); display cd/m².
+/// ValueError for pictures that cannot be compared.
 #[pyfunction]
 #[pyo3(signature = (reference, test, viewing = None, csf = "castle"))]
 pub(crate) fn difference(
@@ -90,9 +91,10 @@ impl Difference {
 
 /// A denoised guide, (height, width, 3), for thresholds and tone; never to be shown.
 ///
-/// rgb: mean of the samples, linear, in a unit in which light lies between 1e-5 and 1e9, (height, width, 3). variance: of the mean's luminance in that unit squared,
-/// (height, width). albedo and normal: of the first surface, (height, width, 3), 0 where there is none. depth: (height, width), not
-/// finite where there is none; a mean over samples of which some met nothing, counted as 0, is fine as well.
+/// rgb: mean of the samples, linear, in a unit in which light lies between 1e-5 and 1e9, (height, width, 3).
+/// variance: of the mean's luminance in that unit squared, (height, width). albedo and normal: of the first surface,
+/// (height, width, 3), 0 where there is none. depth: (height, width), not finite where there is none; a mean over
+/// samples of which some met nothing, counted as 0, is fine as well.
 #[pyfunction]
 pub(crate) fn denoise_guide<'py>(
     py: Python<'py>,

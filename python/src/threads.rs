@@ -1,7 +1,7 @@
 //! Threads that survive a fork.
 //!
-//! `multiprocessing` forks by default on Linux up to Python 3.13. A child has the memory of rayon's global pool, but not its threads, and
-//! would wait for them for ever; it gets a pool of its own.
+//! `multiprocessing` forks by default on Linux up to Python 3.13. A child has the memory of rayon's global pool, but
+//! not its threads, and would wait for them for ever; it gets a pool of its own.
 
 use std::process;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};

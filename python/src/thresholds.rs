@@ -16,10 +16,11 @@ pub(crate) struct ThresholdMap(threshold::ThresholdMap);
 
 /// Finds adaptation, masking and thresholds of a picture.
 ///
-/// display_luminance: (height, width), cd/m² as the display shows them, denoised. guide_variance: (height, width), (cd/m²)², the
-/// variance of the noise in it, so that noise does not hide noise; None takes it as clean. denoised: whether display_luminance is
-/// denoised, and guide_variance that of before. csf: a name of contrast_sensitivity_functions(). ValueError for pictures that are
-/// none, sizes that differ, values below 0 or not finite.
+/// display_luminance: (height, width), cd/m² as the display shows them, denoised. guide_variance: (height, width),
+/// (cd/m²)², the variance of the noise in it, so that noise does not hide noise; None takes it as clean. denoised:
+/// whether display_luminance is denoised, and guide_variance that of before. csf: a name of
+/// contrast_sensitivity_functions(). ValueError for pictures that are none, sizes that differ, values below 0 or not
+/// finite.
 #[pyfunction]
 #[pyo3(signature = (display_luminance, guide_variance = None, viewing = None, csf = "castle", *, denoised = false))]
 pub(crate) fn threshold_map(
@@ -49,8 +50,8 @@ pub(crate) fn contrast_sensitivity_functions() -> Vec<&'static str> {
     csf::names().to_vec()
 }
 
-/// Contrast sensitivity (1 over threshold contrast) of the viewing's observer by the function `csf` at a frequency, cpd, and a
-/// luminance, cd/m²: ValueError where one is below 0 or not finite.
+/// Contrast sensitivity (1 over threshold contrast) of the viewing's observer by the function `csf` at a frequency,
+/// cpd, and a luminance, cd/m²: ValueError where one is below 0 or not finite.
 #[pyfunction]
 #[pyo3(signature = (frequency_cpd, luminance_cd_m2, viewing = None, csf = "castle"))]
 pub(crate) fn contrast_sensitivity(
@@ -101,14 +102,14 @@ impl ThresholdMap {
         plane_to_array(py, work(py, || self.0.allowed_standard_error_cd_m2(visibility))?)
     }
 
-    /// How many times masking raises the allowed standard error, 1 to 3; (height, width). With glare_age_years it holds what keeps
-    /// thresholds from falling under a veil, too, beside very bright lamps hundreds of times.
+    /// How many times masking raises the allowed standard error, 1 to 3; (height, width). With glare_age_years it
+    /// holds what keeps thresholds from falling under a veil, too, beside very bright lamps hundreds of times.
     fn masking_elevation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         plane_to_array(py, work(py, || self.0.masking_elevation())?)
     }
 
-    /// Visibility, in threshold units, that independent pixel errors of this variance ((cd/m²)² on the display, of each pixel's
-    /// mean; (height, width)) will have. Pixels whose variance is below 0 or not finite get infinity.
+    /// Visibility, in threshold units, that independent pixel errors of this variance ((cd/m²)² on the display, of
+    /// each pixel's mean; (height, width)) will have. Pixels whose variance is below 0 or not finite get infinity.
     fn predicted_visibility<'py>(
         &self,
         py: Python<'py>,
@@ -118,8 +119,9 @@ impl ThresholdMap {
         plane_to_array(py, work(py, || self.0.predicted_visibility(&variance))?)
     }
 
-    /// Visibility, in threshold units, of the error that two independent halves of a picture show: half_difference is (A − B)/2 of their
-    /// luminance in display cd/m², (height, width). Noise of colour alone has none, and is not seen here. Pixels that are not finite get infinity and count as 0 for the others.
+    /// Visibility, in threshold units, of the error that two independent halves of a picture show: half_difference is
+    /// (A − B)/2 of their luminance in display cd/m², (height, width). Noise of colour alone has none, and is not
+    /// seen here. Pixels that are not finite get infinity and count as 0 for the others.
     fn measured_visibility<'py>(
         &self,
         py: Python<'py>,
@@ -131,10 +133,10 @@ impl ThresholdMap {
 
     /// The cheapest sample counts that bring visibility down to `visibility` everywhere, with a bound that proves it.
     ///
-    /// variance_per_sample: (height, width), (cd/m²)² on the display. cost: of one sample, any unit, above 0; None is 1 everywhere.
-    /// tolerance: multiplies the visibility allowed. With a budget (Σ cost · samples) the lowest visibility that it pays for is
-    /// found instead, and `visibility` is where the search begins. min_samples everywhere are paid for even where they cost more than
-    /// the budget: compare `cost`.
+    /// variance_per_sample: (height, width), (cd/m²)² on the display. cost: of one sample, any unit, above 0; None is
+    /// 1 everywhere. tolerance: multiplies the visibility allowed. With a budget (Σ cost · samples) the lowest
+    /// visibility that it pays for is found instead, and `visibility` is where the search begins. min_samples
+    /// everywhere are paid for even where they cost more than the budget: compare `cost`.
     #[pyo3(signature = (
         variance_per_sample, *, cost = None, tolerance = None, visibility = 1.0, min_samples = 1.0, max_samples = 1e6, budget = None
     ))]
@@ -186,8 +188,8 @@ pub(crate) struct Allocation {
     lower_bound: f64,
     /// cost / lower_bound − 1.
     gap: f64,
-    /// The visibility asked for or, for a budget, the greatest that the counts leave anywhere, over what is tolerated there, be it
-    /// because max_samples does not reach further.
+    /// The visibility asked for or, for a budget, the greatest that the counts leave anywhere, over what is tolerated
+    /// there, be it because max_samples does not reach further.
     visibility: f64,
     /// Pixels that stay above it even with max_samples everywhere.
     unreachable_pixels: usize,

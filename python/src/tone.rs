@@ -30,11 +30,12 @@ pub(crate) struct Tone {
 
 /// Freezes the operator `name` for a picture, so that the same scene light always becomes the same display light.
 ///
-/// scene: linear Rec. 709 RGB (height, width, 3) or luminance (height, width), scene cd/m². exposure_stops multiplies light by
-/// 2^stops (between -100 and 100). local: adapted at each pixel, for the operators that know it (others take no notice). gaze:
-/// (column, row) the eye rests on, for operators whose eye adapts to what it looks at. acuity: whether `map` takes out the fine
-/// detail that an eye loses in dim light, for ferwerda96, which does unless told otherwise, and ward-larson97, which does not.
-/// ValueError for a name that there is not and for luminance below 0 and light that is not finite.
+/// scene: linear Rec. 709 RGB (height, width, 3) or luminance (height, width), scene cd/m². exposure_stops multiplies
+/// light by 2^stops (between -100 and 100). local: adapted at each pixel, for the operators that know it (others take
+/// no notice). gaze: (column, row) the eye rests on, for operators whose eye adapts to what it looks at. acuity:
+/// whether `map` takes out the fine detail that an eye loses in dim light, for ferwerda96, which does unless told
+/// otherwise, and ward-larson97, which does not. ValueError for a name that there is not and for luminance below 0
+/// and light that is not finite.
 #[pyfunction]
 #[pyo3(signature = (scene, name, viewing = None, *, exposure_stops = 0.0, local = false, gaze = None, acuity = None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -139,10 +140,10 @@ impl Tone {
 
 #[pymethods]
 impl Tone {
-    /// This operator, whose display_luminance, display_variance and display_half_difference are of the picture's own colours, rgb
-    /// (height, width, 3), and not of greys: for srgb, linear, agx and pbr-neutral, which bend or clip each channel by itself. Others
-    /// show every colour as bright as its grey, except those with rods (ferwerda96, durand-dorsey00, pattanaik00), which in dim
-    /// light show blue brighter than these functions say.
+    /// This operator, whose display_luminance, display_variance and display_half_difference are of the picture's own
+    /// colours, rgb (height, width, 3), and not of greys: for srgb, linear, agx and pbr-neutral, which bend or clip
+    /// each channel by itself. Others show every colour as bright as its grey, except those with rods (ferwerda96,
+    /// durand-dorsey00, pattanaik00), which in dim light show blue brighter than these functions say.
     fn coloured(&self, py: Python<'_>, rgb: &Bound<'_, PyAny>) -> PyResult<Self> {
         let pixels = Pixels::borrow("rgb", rgb)?;
         let rgb = self.rgb_of_its_size(&pixels)?;
@@ -150,8 +151,9 @@ impl Tone {
         Ok(Self { fitted, display: self.display.clone(), shape: self.shape })
     }
 
-    /// Linear display RGB 0..1, (height, width, 3), for linear Rec. 709 RGB in scene cd/m² of the same shape. Infinite channels are
-    /// very bright, negative ones and those that are no number dark; where fine detail is lost (acuity) all of these are dark.
+    /// Linear display RGB 0..1, (height, width, 3), for linear Rec. 709 RGB in scene cd/m² of the same shape.
+    /// Infinite channels are very bright, negative ones and those that are no number dark; where fine detail is lost
+    /// (acuity) all of these are dark.
     fn map<'py>(&self, py: Python<'py>, rgb: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let pixels = Pixels::borrow("rgb", rgb)?;
         let rgb = self.rgb_of_its_size(&pixels)?;
@@ -159,8 +161,8 @@ impl Tone {
         rgb_to_array(py, self.shape, shown)
     }
 
-    /// Luminance that the display shows, cd/m², for scene luminance, cd/m², of greys (see coloured); both (height, width). Without
-    /// the loss of fine detail that map shows with acuity.
+    /// Luminance that the display shows, cd/m², for scene luminance, cd/m², of greys (see coloured); both (height,
+    /// width). Without the loss of fine detail that map shows with acuity.
     fn display_luminance<'py>(
         &self,
         py: Python<'py>,
@@ -170,8 +172,8 @@ impl Tone {
         plane_to_array(py, work(py, || seen::display_luminance(&*self.fitted, &self.display, &scene))?)
     }
 
-    /// Variance of the displayed luminance, (cd/m²)², for scene luminance of this mean, cd/m², and variance, (cd/m²)²; all
-    /// (height, width). Pixels that are not finite get infinity.
+    /// Variance of the displayed luminance, (cd/m²)², for scene luminance of this mean, cd/m², and variance,
+    /// (cd/m²)²; all (height, width). Pixels that are not finite get infinity.
     fn display_variance<'py>(
         &self,
         py: Python<'py>,
@@ -183,8 +185,8 @@ impl Tone {
         plane_to_array(py, work(py, || seen::display_variance(&*self.fitted, &self.display, &mean, &variance))?)
     }
 
-    /// Half the difference that two halves A and B make on the display, cd/m²: mean is (A + B)/2, half_difference (A − B)/2, scene
-    /// cd/m²; all (height, width). Pixels that are not finite give 0.
+    /// Half the difference that two halves A and B make on the display, cd/m²: mean is (A + B)/2, half_difference (A
+    /// − B)/2, scene cd/m²; all (height, width). Pixels that are not finite give 0.
     fn display_half_difference<'py>(
         &self,
         py: Python<'py>,
@@ -206,7 +208,8 @@ impl Tone {
     }
 }
 
-/// Linear display RGB 0..1 for a picture, (height, width, 3), through the operator `name` fitted to it: `fit_tone` and `map`.
+/// Linear display RGB 0..1 for a picture, (height, width, 3), through the operator `name` fitted to it: `fit_tone`
+/// and `map`.
 #[pyfunction]
 #[pyo3(signature = (rgb, name, viewing = None, *, exposure_stops = 0.0, local = false))]
 pub(crate) fn tone_map<'py>(

@@ -9,10 +9,11 @@ use crate::errors::value_error;
 
 /// A display at its viewing distance: a preset, with fields of its own where they are given.
 ///
-/// Fields: pixels_per_degree (of visual angle, along a row), pixel_aspect_ratio (width over height of a pixel), white_cd_m2,
-/// black_cd_m2, ambient_cd_m2 (room light off the screen), distance_m (what the eye focuses on, for the function "daly93";
-/// changes pixels_per_degree, so it must be given beside it), csf_area_deg2 (area of the grating whose threshold is meant, for
-/// observers that do not say it). ValueError for an unknown preset and for values that no display has.
+/// Fields: pixels_per_degree (of visual angle, along a row), pixel_aspect_ratio (width over height of a pixel),
+/// white_cd_m2, black_cd_m2, ambient_cd_m2 (room light off the screen), distance_m (what the eye focuses on, for the
+/// function "daly93"; changes pixels_per_degree, so it must be given beside it), csf_area_deg2 (area of the grating
+/// whose threshold is meant, for observers that do not say it). ValueError for an unknown preset and for values that
+/// no display has.
 #[pyclass(frozen, eq, module = "fechner")]
 #[derive(PartialEq)]
 pub(crate) struct Display(pub(crate) display::Display);
@@ -175,8 +176,9 @@ fn named_display(name: &str) -> PyResult<display::Display> {
     display::Display::named(name).map_err(value_error)
 }
 
-/// The eye: sensitivity (1 is the median observer, 1.75 a keen one), csf_area_deg2 (area of the grating whose threshold is
-/// meant, deg²; None takes the display's, or 1), glare_age_years (light scattered in an eye of this age; None scatters none).
+/// The eye: sensitivity (1 is the median observer, 1.75 a keen one), csf_area_deg2 (area of the grating whose
+/// threshold is meant, deg²; None takes the display's, or 1), glare_age_years (light scattered in an eye of this age;
+/// None scatters none).
 #[pyclass(frozen, eq, module = "fechner")]
 #[derive(PartialEq)]
 pub(crate) struct Observer {
@@ -245,7 +247,8 @@ impl Observer {
     }
 }
 
-/// Who looks at what. `display` is a Display or a preset's name; without an observer it is the one the display asks for.
+/// Who looks at what. `display` is a Display or a preset's name; without an observer it is the one the display asks
+/// for.
 #[pyclass(frozen, eq, module = "fechner")]
 #[derive(PartialEq)]
 pub(crate) struct Viewing(pub(crate) display::Viewing);

@@ -55,9 +55,9 @@ fn profile(text: &str) -> Curve {
     Curve::new(&text.split_whitespace().map(point).collect::<Vec<_>>())
 }
 
-/// Turns profiles, parted by "/", into surfaces of `columns` faces around. Each profile is smooth, the next begins at a
-/// corner; they run from the middle of the bottom outwards and up, so that the front is outside. Rows are spread by length,
-/// `rows` in all; v runs from 0 to 1 over each profile on its own.
+/// Turns profiles, parted by "/", into surfaces of `columns` faces around. Each profile is smooth, the next begins at
+/// a corner; they run from the middle of the bottom outwards and up, so that the front is outside. Rows are spread by
+/// length, `rows` in all; v runs from 0 to 1 over each profile on its own.
 pub(crate) fn turn(name: &str, material: &str, (columns, rows): (usize, usize), profiles: &str) -> Vec<Part> {
     let curves: Vec<Curve> = profiles.split('/').map(profile).collect();
     let total: f64 = curves.iter().map(Curve::length).sum();

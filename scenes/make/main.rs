@@ -1,7 +1,7 @@
 //! Writes the meshes, textures and skies under `scenes/`, and the scene files that are too long to write by hand.
 //!
-//! `cargo run --release -p fechner-make-scenes` writes them all anew; they are committed, so nobody has to. Everything is
-//! a pure function of the numbers in this program: running it twice gives the same files.
+//! `cargo run --release -p fechner-make-scenes` writes them all anew; they are committed, so nobody has to.
+//! Everything is a pure function of the numbers in this program: running it twice gives the same files.
 
 mod lathe;
 mod many_lights;

@@ -42,8 +42,8 @@ pub(crate) struct Part {
 }
 
 impl Part {
-    /// The surface `point(u, v)` over [0, 1]², cut into `columns` × `rows` faces. Its front is where ∂u × ∂v points, its
-    /// texture coordinates are (u, v) times `repeat`.
+    /// The surface `point(u, v)` over [0, 1]², cut into `columns` × `rows` faces. Its front is where ∂u × ∂v points,
+    /// its texture coordinates are (u, v) times `repeat`.
     pub(crate) fn surface(
         name: &str,
         material: &str,
@@ -101,8 +101,8 @@ fn short(value: f64, digits: usize) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Writes parts as `folder/name.obj`, which uses `folder/materials.mtl`. Texture coordinates are written for those materials
-/// that `textured` names; the others' would be a quarter of the file for nothing.
+/// Writes parts as `folder/name.obj`, which uses `folder/materials.mtl`. Texture coordinates are written for those
+/// materials that `textured` names; the others' would be a quarter of the file for nothing.
 pub(crate) fn write_obj(
     folder: &Path,
     name: &str,

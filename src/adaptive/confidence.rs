@@ -1,22 +1,26 @@
 //! An upper bound on what can be seen, which holds however often one looks.
 //!
-//! A look's estimate is below the truth about as often as above it, and the more often one looks the likelier one look finds it low. So
-//! the k-th look of which a plan may come adds as many standard errors of the estimate as a normal variable stays below with probability
-//! 1 − α/(k(k+1)). These chances sum to α: a place is wrongly called invisible at any look with a chance of α at most (a union bound over
-//! looks, as in A. Wald's and H. Robbins's sequential tests).
+//! A look's estimate is below the truth about as often as above it, and the more often one looks the likelier one
+//! look finds it low. So the k-th look of which a plan may come adds as many standard errors of the estimate as a
+//! normal variable stays below with probability 1 − α/(k(k+1)). These chances sum to α: a place is wrongly called
+//! invisible at any look with a chance of α at most (a union bound over looks, as in A. Wald's and H. Robbins's
+//! sequential tests).
 //!
-//! v² is a mean over the eye's window, and each pixel of it has an observation of its own: the squared difference of its halves. Their mean
-//! has no bias, where that of pooled variances, which are held to what halves may differ by, is some 3 % low. By how much they miss what was
-//! told of them is the scatter of that mean, heavy tails among it; and so many pixels are in a window that it is nearly normal.
+//! v² is a mean over the eye's window, and each pixel of it has an observation of its own: the squared difference of
+//! its halves. Their mean has no bias, where that of pooled variances, which are held to what halves may differ by,
+//! is some 3 % low. By how much they miss what was told of them is the scatter of that mean, heavy tails among it;
+//! and so many pixels are in a window that it is nearly normal.
 //!
-//! No bound holds for tails of any weight (Bahadur and Savage 1956): of a lognormal with a coefficient of variation of 2 it fails four times
-//! as often at 16 samples. Not for models that pool nothing, nor for what a denoiser changed. Paths that were never sampled are in no bound.
+//! No bound holds for tails of any weight (Bahadur and Savage 1956): of a lognormal with a coefficient of variation
+//! of 2 it fails four times as often at 16 samples. Not for models that pool nothing, nor for what a denoiser
+//! changed. Paths that were never sampled are in no bound.
 
 use super::judge::{Judgement, variance_shares};
 use super::state::RenderState;
 use fechner_perception::Plane;
 
-/// Standard errors that a look adds to stay on the safe side with probability `confidence` over all looks, `earlier_looks` before it.
+/// Standard errors that a look adds to stay on the safe side with probability `confidence` over all looks,
+/// `earlier_looks` before it.
 pub(super) fn standard_errors(confidence: f64, earlier_looks: u32) -> f64 {
     let look = f64::from(earlier_looks) + 1.0;
     upper_quantile((1.0 - confidence) / (look * (look + 1.0)))
@@ -59,8 +63,9 @@ pub(super) fn factor_of_bound(judgement: &Judgement, state: &RenderState, standa
     }))
 }
 
-/// What a mean is raised by to an upper bound of so many standard errors. A mean that is skewed to the right is low when its variance is:
-/// N. J. Johnson's correction (1978, "Modified t tests and confidence intervals for asymmetrical populations").
+/// What a mean is raised by to an upper bound of so many standard errors. A mean that is skewed to the right is low
+/// when its variance is: N. J. Johnson's correction (1978, "Modified t tests and confidence intervals for
+/// asymmetrical populations").
 fn margin(variance: f64, third_moment: f64, standard_errors: f64) -> f64 {
     if variance <= 0.0 {
         return 0.0;
@@ -95,7 +100,8 @@ mod tests {
         (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
     }
 
-    /// Even noise, a lognormal of coefficient of variation 2, and fireflies of a tenth of the light that one sample in 200 finds.
+    /// Even noise, a lognormal of coefficient of variation 2, and fireflies of a tenth of the light that one sample
+    /// in 200 finds.
     const NOISES: [Noise; 3] = [
         Noise { name: "even", draw: |u, _| 0.2 + 0.2 * u, variance: 0.04 / 12.0 },
         // exp(σ²) = 5.

@@ -7,13 +7,13 @@ use crate::integrator::SamplePlan;
 use crate::sampler::Half;
 use fechner_perception::Plane;
 
-/// Forecasts aim at so much of the visibility asked for, since estimates will move and the worst pixels count: with 0.98 three
-/// scenes at 128×128 took 12, 12 and 6 looks, with this 10, 9 and 4, for as many samples (counted by hand on 22 November 2026, in
-/// `plans` of `render --json`).
+/// Forecasts aim at so much of the visibility asked for, since estimates will move and the worst pixels count: with
+/// 0.98 three scenes at 128×128 took 12, 12 and 6 looks, with this 10, 9 and 4, for as many samples (counted by hand
+/// on 22 November 2026, in `plans` of `render --json`).
 const AIM: f64 = 0.9;
 
-/// A film and how it was judged, from which the visibility after more samples is foretold: variances of a sample as they were, and
-/// each band's smear as it was.
+/// A film and how it was judged, from which the visibility after more samples is foretold: variances of a sample as
+/// they were, and each band's smear as it was.
 pub(super) struct Forecast<'a> {
     film: &'a Film,
     judgement: &'a Judgement,
@@ -32,9 +32,9 @@ impl<'a> Forecast<'a> {
         Self { film, judgement, smear }
     }
 
-    /// Factor on the visibility that the allocation may leave at each pixel: that of thresholds, and what the bands' smear makes of the
-    /// noise around it, which the allocation's constraints leave out. A dark strip beside bright noise sees more of it than the
-    /// strip's own.
+    /// Factor on the visibility that the allocation may leave at each pixel: that of thresholds, and what the bands'
+    /// smear makes of the noise around it, which the allocation's constraints leave out. A dark strip beside bright
+    /// noise sees more of it than the strip's own.
     pub(super) fn tolerance(&self) -> Plane {
         match &self.judgement.threshold_factor {
             None => self.smear.clone(),
@@ -88,8 +88,8 @@ mod tests {
         assert!(!forecast.is_reached_by(&SamplePlan::default(), worst), "without samples nothing changes");
     }
 
-    /// Beside noise a quiet pixel sees more than its own: the allocation may leave less there than the pixel alone would suffer.
-    /// Amid even noise its own is what it sees.
+    /// Beside noise a quiet pixel sees more than its own: the allocation may leave less there than the pixel alone
+    /// would suffer. Amid even noise its own is what it sees.
     #[test]
     fn less_is_tolerated_beside_noise() {
         let film = film_of(|pixel, random| {
@@ -99,7 +99,8 @@ mod tests {
         let mut judgement = judge(&film, &settings(), 1.0).expect("judges");
         let tolerance = Forecast::of(&film, &judgement).tolerance();
         let column = |x: usize| (8..56).map(|y| f64::from(tolerance.get(x, y))).sum::<f64>() / 48.0;
-        // Pooling alone brings the noise some 20 pixels far; bands bring it further, and there the quiet pixel's own is least.
+        // Pooling alone brings the noise some 20 pixels far; bands bring it further, and there the quiet pixel's own
+        // is least.
         let (amid, beside) = (column(12), column(60));
         assert!((amid - 1.0).abs() < 0.01, "amid noise {amid}");
         assert!((0.9..0.98).contains(&beside), "beside it {beside}");

@@ -41,8 +41,9 @@ pub struct Judgement {
     pub tone: Box<dyn FittedTone>,
     /// What can be seen where.
     pub thresholds: Thresholds,
-    /// What thresholds are multiplied by: [`LoopSettings::importance`], over what makes an upper bound of the estimate where one is asked for.
-    /// `thresholds` are without it; what a judgement's methods say, and `predicted`, is with it.
+    /// What thresholds are multiplied by: [`LoopSettings::importance`], over what makes an upper bound of the
+    /// estimate where one is asked for. `thresholds` are without it; what a judgement's methods say, and `predicted`,
+    /// is with it.
     pub threshold_factor: Option<Plane>,
     /// Whether the film has samples enough to tell what can be seen: [`Film::has_both_halves`].
     pub is_known: bool,
@@ -51,12 +52,13 @@ pub struct Judgement {
     /// Displayed variance of one sample as the neighbours tell it, as the luminance variance that shows as much as the
     /// most visible of the eye's three channels: the variance of the mean is this over the count.
     pub pooled_variance_per_sample: Plane,
-    /// The same as each half may go by it, whose own luck is not in what it may have missed; `None` where the look was for no plan, or
-    /// nothing may be missed.
+    /// The same as each half may go by it, whose own luck is not in what it may have missed; `None` where the look
+    /// was for no plan, or nothing may be missed.
     pub pooled_of_halves: Option<[Plane; 2]>,
     /// The larger of that and what the other half knows of the pixel itself; `None` where the look was for no plan.
     pub variance_per_sample: Option<[Plane; 2]>,
-    /// The first of these variances by what samples have met, before black where the picture is transparent: what audits compare with.
+    /// The first of these variances by what samples have met, before black where the picture is transparent: what
+    /// audits compare with.
     pub met_per_sample: Plane,
     /// What can be seen of a transparent picture over white.
     over_white: Option<OverWhite>,
@@ -78,8 +80,8 @@ pub enum JudgeError {
     Denoiser(#[from] OidnError),
 }
 
-/// Looks at the film through display and eye. `inflation` multiplies every variance (1, unless an audit found it low); of a denoised
-/// picture, the squared error that is inferred rather than witnessed.
+/// Looks at the film through display and eye. `inflation` multiplies every variance (1, unless an audit found it
+/// low); of a denoised picture, the squared error that is inferred rather than witnessed.
 ///
 /// # Errors
 /// If the denoiser fails, or the perception model refuses the film's maps.
@@ -117,8 +119,8 @@ pub(super) enum LookFor {
     Plan,
 }
 
-/// The shorter side, pixels, from which the difference of a denoised picture's halves tells what noise is left: below it is judged as the
-/// raw mean. A crop of one pixel at 4 samples was called perfect, and was wrong by 32 thresholds.
+/// The shorter side, pixels, from which the difference of a denoised picture's halves tells what noise is left: below
+/// it is judged as the raw mean. A crop of one pixel at 4 samples was called perfect, and was wrong by 32 thresholds.
 const MIN_SIDE_OF_HALVES: u32 = 8;
 
 fn judge_by(
@@ -187,7 +189,8 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// By its end. Of the denoised picture's error, if there is one, what is inferred is multiplied by the root of `inflation`.
+    /// By its end. Of the denoised picture's error, if there is one, what is inferred is multiplied by the root of
+    /// `inflation`.
     fn finished(self, denoised: Option<TimedDenoising>, inflation: f64) -> Result<Judgement, JudgeError> {
         let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
         let denoised = denoised.map(|found| self.judged_picture(found, inflation)).transpose()?;
@@ -295,8 +298,8 @@ impl Judgement {
         self.under_thresholds(self.thresholds.visibility(display_variance))
     }
 
-    /// The same with each pixel's noise judged where it is, before the bands smear it: what the allocation's constraints say. One
-    /// blur in the place of twenty.
+    /// The same with each pixel's noise judged where it is, before the bands smear it: what the allocation's
+    /// constraints say. One blur in the place of twenty.
     pub fn rough_visibility_of(&self, display_variance: &Plane) -> Plane {
         self.thresholds.in_bands.pooled(&self.energy_of(display_variance)).map(f32::sqrt)
     }
@@ -349,8 +352,8 @@ impl Judgement {
         self.denoised.as_ref().map_or_else(raw, |denoised| denoised.half_difference.clone())
     }
 
-    /// What can be seen of the halves' luminance difference: the same as predicted, measured; of the denoised halves where the
-    /// picture is denoised.
+    /// What can be seen of the halves' luminance difference: the same as predicted, measured; of the denoised halves
+    /// where the picture is denoised.
     pub fn measured_error(&self) -> &MeasuredError {
         self.measured.get_or_init(|| {
             let displayed = self.displayed_half_difference();

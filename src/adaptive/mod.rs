@@ -3,14 +3,15 @@
 //! The loop itself is [`Loop::run_to_end`]; [`render`], [`resume`] and [`run`] lead to it. In turn it
 //!
 //! 1. traces what is planned (`trace_pending`): at first a pilot of some samples in every pixel;
-//! 2. looks at the film as an eye in front of the display would ([`mod@judge`]): thresholds, and how visible the noise is;
-//! 3. decides by that look (`next_step`) whether the rung of the ladder that it is on is reached, audits it by fresh samples, and
-//!    goes on to the next;
+//! 2. looks at the film as an eye in front of the display would ([`mod@judge`]): thresholds, and how visible the
+//!    noise is;
+//! 3. decides by that look (`next_step`) whether the rung of the ladder that it is on is reached, audits it by fresh
+//!    samples, and goes on to the next;
 //! 4. or plans more samples ([`plan`]): the cheapest counts that reach the rung;
 //! 5. ends when the last rung is reached, when a limit is, or when no pixel may have more.
 //!
-//! The ladder of visibilities is fixed, so that a render is the beginning of any that goes on from it on the same ladder: one above
-//! threshold, one from there down.
+//! The ladder of visibilities is fixed, so that a render is the beginning of any that goes on from it on the same
+//! ladder: one above threshold, one from there down.
 //!
 //! | file | answers |
 //! | --- | --- |
@@ -31,7 +32,8 @@
 //! | `monitor`, `progress` | what is told meanwhile |
 //! | `awake` | threads that do not fall asleep during a look |
 //!
-//! Nothing here traces a ray or knows a formula of vision: the first is the [`crate::integrator`]'s, the second the perception crate's.
+//! Nothing here traces a ray or knows a formula of vision: the first is the [`crate::integrator`]'s, the second the
+//! perception crate's.
 
 pub mod audit;
 mod awake;
@@ -193,8 +195,8 @@ pub fn run(
     }
 }
 
-/// One look of [`run`]'s loop at a state all of whose plans are traced, for somebody who traces elsewhere and has the state's file.
-/// Limits of time and plans are not looked at.
+/// One look of [`run`]'s loop at a state all of whose plans are traced, for somebody who traces elsewhere and has the
+/// state's file. Limits of time and plans are not looked at.
 ///
 /// # Errors
 /// As of [`render`].

@@ -29,7 +29,8 @@ pub(super) fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) ->
     }
 }
 
-/// Samples until the first limit, that of time apart: plans are taken to be as large as those of the one that comes next.
+/// Samples until the first limit, that of time apart: plans are taken to be as large as those of the one that comes
+/// next.
 fn remaining_samples(state: &RenderState, limits: &Limits, judgement: &Judgement, next: &SamplePlan) -> f64 {
     let (film, traced) = (&state.film, state.film.total_samples());
     let until_budget = limits.mean_samples.map(|mean| f64::from(mean) * film.pixel_count() as f64 - traced as f64);
@@ -39,8 +40,9 @@ fn remaining_samples(state: &RenderState, limits: &Limits, judgement: &Judgement
     limited.min(samples_to_target(film, limits, judgement))
 }
 
-/// Samples until nothing is more visible than it may be, where the noise behaves as it did and no pixel takes more than it may have.
-/// Infinite where no visibility is asked for and pixels may have as many as by default, which no render comes to.
+/// Samples until nothing is more visible than it may be, where the noise behaves as it did and no pixel takes more
+/// than it may have. Infinite where no visibility is asked for and pixels may have as many as by default, which no
+/// render comes to.
 fn samples_to_target(film: &Film, limits: &Limits, judgement: &Judgement) -> f64 {
     let target = limits.last_rung();
     if target <= 0.0 && limits.max_samples == DEFAULT_MAX_SAMPLES {

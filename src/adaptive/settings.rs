@@ -71,8 +71,8 @@ pub enum AllocationRule {
 pub struct Limits {
     /// Visibility that may remain; 1 is at threshold. `None`: only the other limits count.
     pub visibility: Option<f64>,
-    /// Probability, from 0.5 to 1, with which a place of a raw picture is no more visible than told, over all looks of the default threshold
-    /// model. `None`: estimates are told and gone by as they are.
+    /// Probability, from 0.5 to 1, with which a place of a raw picture is no more visible than told, over all looks
+    /// of the default threshold model. `None`: estimates are told and gone by as they are.
     pub confidence: Option<f64>,
     /// Time since the start; checked between plans.
     pub time: Option<Duration>,
@@ -82,11 +82,13 @@ pub struct Limits {
     pub max_samples: u32,
     /// Number of plans, to repeat a render that ended by time.
     pub plans: Option<u32>,
-    /// Samples of every pixel before the first look where the other limits allow as many: [`Self::pilot`] is what they come to.
+    /// Samples of every pixel before the first look where the other limits allow as many: [`Self::pilot`] is what
+    /// they come to.
     pub pilot_samples: u32,
 }
 
-/// Pilot of a picture that is denoised: the denoiser reads neighbours where raw variance needs samples of the pixel's own.
+/// Pilot of a picture that is denoised: the denoiser reads neighbours where raw variance needs samples of the pixel's
+/// own.
 pub const DENOISED_PILOT_SAMPLES_PER_PIXEL: u32 = 4;
 
 impl Limits {
@@ -95,8 +97,8 @@ impl Limits {
         self.visibility.unwrap_or(THRESHOLD)
     }
 
-    /// The visibility at which the ladder ends: 0, which no noise gets below, where only other limits count. So films and the
-    /// viewer state what is aimed at.
+    /// The visibility at which the ladder ends: 0, which no noise gets below, where only other limits count. So films
+    /// and the viewer state what is aimed at.
     pub fn last_rung(&self) -> f64 {
         self.visibility.unwrap_or(0.0)
     }
@@ -141,16 +143,17 @@ pub struct LoopSettings {
     pub nits_per_unit: f64,
     /// How the picture is shown.
     pub operator: Box<dyn ToneOperator>,
-    /// A fit of the operator that was made elsewhere, for the frames of one shot or a part of a picture; without it, each look fits
-    /// its own.
+    /// A fit of the operator that was made elsewhere, for the frames of one shot or a part of a picture; without it,
+    /// each look fits its own.
     pub fitted: Option<SavedTone>,
     /// For a frame of a moving picture, whose noise is gone in the next: how frames follow. `None` for stills and for
     /// frames that may be paused.
     pub frames: Option<FrameTiming>,
-    /// What each pixel's thresholds are multiplied by, above 0, of the film's size: somebody's own idea of what matters.
+    /// What each pixel's thresholds are multiplied by, above 0, of the film's size: somebody's own idea of what
+    /// matters.
     pub importance: Option<Plane>,
-    /// Where one looks, in pixels of the film: thresholds rise away from all of these. None for a picture that anybody may look at
-    /// anywhere. For the default threshold model alone.
+    /// Where one looks, in pixels of the film: thresholds rise away from all of these. None for a picture that
+    /// anybody may look at anywhere. For the default threshold model alone.
     pub gazes: Vec<Gaze>,
     /// Eyes that follow what moves, for [`Self::frames`] and the default threshold model alone; `None`: they rest.
     pub pursuit: Option<Pursuit>,
@@ -158,9 +161,11 @@ pub struct LoopSettings {
     pub filter: PixelFilter,
     /// What makes the output picture out of the mean; `None` leaves it raw.
     pub denoiser: Option<Denoiser>,
-    /// Whether the picture has alpha and is laid over other pictures, so that noise of what it covers must be invisible over black and over white.
+    /// Whether the picture has alpha and is laid over other pictures, so that noise of what it covers must be
+    /// invisible over black and over white.
     pub is_transparent: bool,
-    /// Asked during a look: whether it is of no use any more, as somebody wants another picture. `None` never interrupts.
+    /// Asked during a look: whether it is of no use any more, as somebody wants another picture. `None` never
+    /// interrupts.
     pub is_cancelled: Option<Box<dyn Fn() -> bool + Send + Sync>>,
 }
 
@@ -192,13 +197,15 @@ impl LoopSettings {
         self.fitted = Some(self.operator.fit(&whole.guide_for(self.operator.as_ref()), &self.viewing, None).save());
     }
 
-    /// Whether a render that stopped at a visibility is the beginning of this one, so that going on from it gives the same bytes.
+    /// Whether a render that stopped at a visibility is the beginning of this one, so that going on from it gives the
+    /// same bytes.
     pub fn ladder_passes_through(&self, visibility: f64) -> bool {
         self.sampling != Sampling::Adaptive || self.rungs().contains(&visibility)
     }
 
-    /// The visibilities that are passed on the way to the one that is asked for, largest first. They are fixed, so that a
-    /// render continued to a lower rung equals one that went there in one go, both above threshold or both at it or below.
+    /// The visibilities that are passed on the way to the one that is asked for, largest first. They are fixed, so
+    /// that a render continued to a lower rung equals one that went there in one go, both above threshold or both at
+    /// it or below.
     pub(super) fn rungs(&self) -> Vec<f64> {
         let target = self.limits.last_rung();
         let highest = match self.denoiser {
@@ -213,15 +220,15 @@ impl LoopSettings {
 /// Samples that a pixel gets at most when nobody says otherwise: beyond it, it is reported as visible instead.
 pub const DEFAULT_MAX_SAMPLES: u32 = 1 << 18;
 
-/// The ladder of a picture that is denoised begins here, or at its target: far above threshold its greatest error is in places that
-/// no denoiser can help, and they may not have all samples before the rest is looked after.
+/// The ladder of a picture that is denoised begins here, or at its target: far above threshold its greatest error is
+/// in places that no denoiser can help, and they may not have all samples before the rest is looked after.
 const HIGHEST_DENOISED_RUNG: f64 = 2.0;
 /// Where the ladder of any other picture begins whose target is above threshold.
 const HIGHEST_RUNG: f64 = 16.0;
 /// Visibility at threshold, as [`fechner_perception`] counts.
 ///
-/// On the way to it or below there is no rung above it: each leaves a picture that is equally visible everywhere, which is the
-/// cheapest when it is the last, but not the best when it is not (`benches/results/equal-time.md`).
+/// On the way to it or below there is no rung above it: each leaves a picture that is equally visible everywhere,
+/// which is the cheapest when it is the last, but not the best when it is not (`benches/results/equal-time.md`).
 pub const THRESHOLD: f64 = 1.0;
 
 /// Below it nothing is in between.

@@ -100,8 +100,8 @@ impl RenderState {
         Self { inflation, plans, looks, seconds, ..Self::of_film(film, most_samples) }
     }
 
-    /// A film about which nothing has been decided: empty, merged from others, or made for other eyes. Planned is what it
-    /// lacks of a pilot of 8 + 8 samples a pixel, or of `most_samples` in all.
+    /// A film about which nothing has been decided: empty, merged from others, or made for other eyes. Planned is
+    /// what it lacks of a pilot of 8 + 8 samples a pixel, or of `most_samples` in all.
     pub fn of_film(film: Film, most_samples: u32) -> Self {
         Self {
             pending: pilot_plan(&film, most_samples).non_empty().into_iter().collect(),
@@ -121,8 +121,9 @@ impl RenderState {
         }
     }
 
-    /// What is planned is dropped where it would go beyond these limits, as it may when a render goes on to tighter ones than it was
-    /// planned for; of a pilot stays what they allow. What was planned within the same limits stays as it is.
+    /// What is planned is dropped where it would go beyond these limits, as it may when a render goes on to tighter
+    /// ones than it was planned for; of a pilot stays what they allow. What was planned within the same limits stays
+    /// as it is.
     #[must_use]
     pub(super) fn kept_to(self, limits: &Limits) -> Self {
         if self.is_planned_within(limits) {

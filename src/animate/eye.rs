@@ -9,8 +9,8 @@ use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::{Error, Plane};
 use glam::Vec2;
 
-/// Whether eyes follow what moves. Each frame's noise is its own and stands still on the display for as long as the frame does, so
-/// a moving eye smears it, and it may be stronger. Eyes that rest see it best.
+/// Whether eyes follow what moves. Each frame's noise is its own and stands still on the display for as long as the
+/// frame does, so a moving eye smears it, and it may be stronger. Eyes that rest see it best.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Eye {
     /// They rest: safe whatever viewers do.
@@ -41,8 +41,8 @@ impl ShotSettings {
         })
     }
 
-    /// Of what each pixel shows, by the slower of its motions from the frame before and to the next: eyes that follow less see
-    /// more.
+    /// Of what each pixel shows, by the slower of its motions from the frame before and to the next: eyes that follow
+    /// less see more.
     fn image_velocity_deg_s(&self, velocity: &VelocityMap) -> Result<Plane, Error> {
         let area = self.trace.film_area();
         let (width, height) = (area.width as usize, area.height as usize);
@@ -123,9 +123,15 @@ mod tests {
     fn a_watched_eye_moves_as_its_gaze() {
         let track = "frame,x,y\n1,10,20\n2,13,24\n3,16,28\n5,0,0\n6,80,0\n7,80,0\n8,1,1\n8,2,2\n9,3,3\n";
         let watched = |frame| shot(Eye::FollowsGaze, Some(track)).pursuit(frame, &moving()).expect("a display");
-        // Five pixels a frame.
-        assert_eq!(watched(2), Some(Pursuit::Watched(3.0)));
-        assert_eq!(watched(6), Some(Pursuit::Watched(24.0)));
+        // Five pixels a frame, then forty; a degree beside the middle of a flat display pixels are 0.1 % smaller.
+        for (frame, expected) in [(2, 3.0), (6, 24.0)] {
+            match watched(frame) {
+                Some(Pursuit::Watched(velocity)) => {
+                    assert!((velocity / expected - 1.0).abs() < 2e-3, "{velocity} for {expected}");
+                }
+                other => panic!("{other:?}"),
+            }
+        }
         // At the ends, beside frames without a line, and with two viewers nothing is known.
         assert!([0, 1, 3, 4, 5, 7, 8, 9, u32::MAX].into_iter().all(|frame| watched(frame).is_none()));
     }

@@ -37,13 +37,15 @@ pub(super) use shot::{Shot, ShotFrame};
 pub(super) struct AnimateArguments {
     /// Scene with keyframes: .toml, .gltf, .glb, .pbrt, or any other with a side file that moves its camera.
     scene: PathBuf,
-    /// Frames to render, first..last, both included, or one; frame 0 is at 0 s. Frames of the shot that are there already are kept.
+    /// Frames to render, first..last, both included, or one; frame 0 is at 0 s. Frames of the shot that are there
+    /// already are kept.
     #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
     frames: Frames,
     /// All frames of the shot, where --frames renders a part of it: exposure and eyes are those of the whole shot.
     #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
     shot: Option<Frames>,
-    /// Files, with # for each digit of the frame's number: out/shot.####.exr (all layers) or .png (as the display shows it).
+    /// Files, with # for each digit of the frame's number: out/shot.####.exr (all layers) or .png (as the display
+    /// shows it).
     #[arg(short, long, value_name = "FILE")]
     output: String,
     /// Frames a second.
@@ -55,19 +57,19 @@ pub(super) struct AnimateArguments {
     #[command(flatten)]
     staging: super::staging::Staging,
 
-    /// A frame is done when its remaining noise is at most this visible in motion: 1 is at threshold [default: the scene's, else
-    /// 1; none for uniform sampling with --spp or --time].
+    /// A frame is done when its remaining noise is at most this visible in motion: 1 is at threshold [default: the
+    /// scene's, else 1; none for uniform sampling with --spp or --time].
     #[arg(long, value_name = "V", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
     visibility: Option<f64>,
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
-    /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most; for uniform
-    /// sampling as many in each.
+    /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most;
+    /// for uniform sampling as many in each.
     #[arg(long, value_name = "N", value_parser = whole(1..=Film::MAX_SAMPLES_PER_PIXEL), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
-    /// A budget of this many seconds for all frames that are rendered, spent on those that need it most; for uniform sampling as
-    /// many on each.
+    /// A budget of this many seconds for all frames that are rendered, spent on those that need it most; for uniform
+    /// sampling as many on each.
     #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true, conflicts_with = "spp", help_heading = "Until")]
     time: Option<Duration>,
     /// Most samples of one pixel, at least 16.
@@ -91,12 +93,12 @@ pub(super) struct AnimateArguments {
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     adapted_to: Option<f64>,
-    /// Where viewers look: lines of frame,x,y in pixels, all inside the picture. What is far from all gazes of a frame may stay noisier; in
-    /// frames without a line everything may be looked at.
+    /// Where viewers look: lines of frame,x,y in pixels, all inside the picture. What is far from all gazes of a
+    /// frame may stay noisier; in frames without a line everything may be looked at.
     #[arg(long, value_name = "FILE.csv", conflicts_with = "pausable", help_heading = "Seeing")]
     gaze: Option<PathBuf>,
-    /// What viewers' eyes do. A frame's noise stands still on the display while it is held, so that an eye that follows what moves
-    /// smears it, and there may be more. An eye at rest sees the most.
+    /// What viewers' eyes do. A frame's noise stands still on the display while it is held, so that an eye that
+    /// follows what moves smears it, and there may be more. An eye at rest sees the most.
     #[arg(long, value_enum, default_value = "none", help_heading = "Seeing")]
     eye: EyeChoice,
     /// Tone operator [default: the scene's, else constant].
@@ -114,8 +116,8 @@ pub(super) struct AnimateArguments {
     /// Whose motion the layers of motion tell in mirrors and clear glass. Rough ones always have their surface's.
     #[arg(long, value_enum, default_value = "surface", help_heading = "Picture")]
     velocity_of: VelocityChoice,
-    /// Make a video of the shot when all its frames are there: .y4m, or .mp4 by an installed ffmpeg. It is not HDR: an HDR
-    /// display's white becomes its white.
+    /// Make a video of the shot when all its frames are there: .y4m, or .mp4 by an installed ffmpeg. It is not HDR:
+    /// an HDR display's white becomes its white.
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     video: Option<PathBuf>,
 
@@ -128,7 +130,8 @@ pub(super) struct AnimateArguments {
 enum SamplingChoice {
     /// Where the remaining error can be seen.
     Adaptive,
-    /// The same everywhere in a frame. Where --time ends it on the way from one count to the next, some pixels have the next already.
+    /// The same everywhere in a frame. Where --time ends it on the way from one count to the next, some pixels have
+    /// the next already.
     Uniform,
 }
 

@@ -24,11 +24,12 @@ pub(super) struct BenchArguments {
     /// How much to do.
     #[arg(long, value_enum, default_value = "quick")]
     suite: Suite,
-    /// Folder for results.json, results.csv and report.html, for denoise.json or for animation.json; finished renders in it of all
-    /// suites but animation are not made again by the same build of the program.
+    /// Folder for results.json, results.csv and report.html, for denoise.json or for animation.json; finished renders
+    /// in it of all suites but animation are not made again by the same build of the program.
     #[arg(short, long, value_name = "DIR", default_value = "bench")]
     output: PathBuf,
-    /// Pixels to a side of the square pictures, in the suite animation pixels across pictures of 16:9, in place of the suite's.
+    /// Pixels to a side of the square pictures, in the suite animation pixels across pictures of 16:9, in place of
+    /// the suite's.
     #[arg(long, value_name = "N", value_parser = whole(32..=4096), allow_negative_numbers = true)]
     size: Option<u32>,
     /// Visibility that every arm has to reach, in place of the suite's.
@@ -40,21 +41,22 @@ pub(super) struct BenchArguments {
     /// Display preset.
     #[arg(long, value_name = "NAME", default_value = DEFAULT_DISPLAY)]
     display: String,
-    /// Samples of the reference, as a multiple of what uniform sampling needs (at least 512, at most 16384 a pixel); in the
-    /// suite animation, of 64 a pixel.
+    /// Samples of the reference, as a multiple of what uniform sampling needs (at least 512, at most 16384 a pixel);
+    /// in the suite animation, of 64 a pixel.
     #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, default_value_t = 16.0)]
     reference_factor: f64,
     /// Frames a second of the suite animation, in place of 24 and 60.
     #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true)]
     fps: Option<f64>,
-    /// Only say what uniform sampling and the optimum need by converged variances, with one sample in every pixel at least: what
-    /// no rule can beat.
+    /// Only say what uniform sampling and the optimum need by converged variances, with one sample in every pixel at
+    /// least: what no rule can beat.
     #[arg(long)]
     bound: bool,
     /// Arms, separated by commas, in place of the suite's.
     #[arg(long, value_name = "ARM,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(Arm::ALL.map(Arm::name)))]
     arms: Vec<String>,
-    /// Denoisers, separated by commas: of the suite denoise, without any builtin and oidn; of the suite animation, without any none.
+    /// Denoisers, separated by commas: of the suite denoise, without any builtin and oidn; of the suite animation,
+    /// without any none.
     #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',')]
     denoise: Vec<DenoiseChoice>,
     /// In the suite denoise, leave out what compares rules of sampling.
@@ -68,9 +70,11 @@ enum Suite {
     Quick,
     /// 256×256, visibility 1, every arm, five seeds: a night.
     Full,
-    /// 128×128, denoised pictures: the law against the truth, and samples to a quality. Prints tables, writes denoise.json.
+    /// 128×128, denoised pictures: the law against the truth, and samples to a quality. Prints tables, writes
+    /// denoise.json.
     Denoise,
-    /// 96×54, visibility 2, eight frames at 24 and at 60 a second: what motion hides. Prints tables, writes animation.json.
+    /// 96×54, visibility 2, eight frames at 24 and at 60 a second: what motion hides. Prints tables, writes
+    /// animation.json.
     Animation,
 }
 

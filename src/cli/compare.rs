@@ -25,28 +25,29 @@ use std::process::ExitCode;
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub(super) struct CompareArguments {
-    /// The picture that is right; with # for each digit of a frame's number, a sequence of them: a.####.exr. PNG and JPEG
-    /// files hold sRGB, or PQ where they say so, which colour management brings to the display; 16 bits without a tag are
-    /// the display's own codes.
+    /// The picture that is right; with # for each digit of a frame's number, a sequence of them: a.####.exr. PNG and
+    /// JPEG files hold sRGB, or PQ where they say so, which colour management brings to the display; 16 bits without
+    /// a tag are the display's own codes.
     reference: PathBuf,
     /// The picture, or sequence, to be told from it.
     test: PathBuf,
     #[command(flatten)]
     seeing: SeeingArguments,
-    /// Tone operator that shows scene-linear pictures, fitted to the reference, or to the test where only that is one [default: as that
-    /// one was shown when it was rendered, if its file says so and the display is as bright and dark, else constant].
+    /// Tone operator that shows scene-linear pictures, fitted to the reference, or to the test where only that is one
+    /// [default: as that one was shown when it was rendered, if its file says so and the display is as bright and
+    /// dark, else constant].
     #[arg(long, value_name = "NAME", value_parser = operator_values())]
     operator: Option<String>,
-    /// Frames a second, of sequences. Beyond its ends a sequence is expected to go on as it is within a fifth of a second of
-    /// them; flicker of three frames and more a period may be seen too well there.
+    /// Frames a second, of sequences. Beyond its ends a sequence is expected to go on as it is within a fifth of a
+    /// second of them; flicker of three frames and more a period may be seen too well there.
     #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true)]
     fps: Option<f64>,
-    /// Motion of what a sequence shows, in pixels a frame, which the eye follows, smearing what is held; without it, it rests. Frames of
-    /// `animate` have it.
+    /// Motion of what a sequence shows, in pixels a frame, which the eye follows, smearing what is held; without it,
+    /// it rests. Frames of `animate` have it.
     #[arg(long, value_name = "FILE.exr")]
     velocity: Option<PathBuf>,
-    /// Write where the difference is seen, in the colours of render's map of visibility: blue below threshold, red to yellow above; for a
-    /// sequence with # in the name.
+    /// Write where the difference is seen, in the colours of render's map of visibility: blue below threshold, red to
+    /// yellow above; for a sequence with # in the name.
     #[arg(long, value_name = "FILE.png")]
     map: Option<PathBuf>,
     /// Write the figures here.

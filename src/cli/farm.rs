@@ -33,8 +33,8 @@ enum FarmCommand {
     /// Render units: complete or not at all, from their checkpoints where there are any. SIGUSR1 writes the checkpoint,
     /// SIGTERM writes it and ends with status 75.
     Unit(unit::UnitArguments),
-    /// Merge the frames whose units are all there, look at them, and hand out the next round or write the picture. Status 75
-    /// if units are missing.
+    /// Merge the frames whose units are all there, look at them, and hand out the next round or write the picture.
+    /// Status 75 if units are missing.
     Merge(merge::MergeArguments),
     /// Render and merge until everything is done; any number of these may work on one folder.
     Work(work::WorkArguments),

@@ -44,7 +44,8 @@ pub(super) struct JobArguments {
     /// Picture size.
     #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<Size>,
-    /// Trace only this part of the picture, with the samples and, to a few per cent, the exposure it has in the whole. An EXR says where it lies.
+    /// Trace only this part of the picture, with the samples and, to a few per cent, the exposure it has in the
+    /// whole. An EXR says where it lies.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop, allow_hyphen_values = true)]
     crop: Option<Crop>,
     #[command(flatten)]
@@ -53,15 +54,15 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = parse_finite, allow_negative_numbers = true)]
     at: f64,
 
-    /// Stop when the remaining noise is at most this visible: 1 is at threshold [default: the scene's, else 1; none for uniform
-    /// sampling with --spp, --time or --plans].
+    /// Stop when the remaining noise is at most this visible: 1 is at threshold [default: the scene's, else 1; none
+    /// for uniform sampling with --spp, --time or --plans].
     #[arg(long, value_name = "V", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
     visibility: Option<f64>,
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
-    /// Stop where the picture is no more visible than that with this confidence, in per cent, however often it was looked at. Visibilities
-    /// are told as such upper bounds [default: they are estimates].
+    /// Stop where the picture is no more visible than that with this confidence, in per cent, however often it was
+    /// looked at. Visibilities are told as such upper bounds [default: they are estimates].
     #[arg(long, value_name = "PERCENT", value_parser = parse_confidence, allow_negative_numbers = true, help_heading = "Until")]
     confidence: Option<f64>,
     /// Stop after this many seconds of rendering, between plans; the first of them, 16 samples a pixel (4 of a denoised
@@ -114,8 +115,8 @@ pub(super) struct JobArguments {
 
     #[arg(long, value_name = "NAME|FILE", help = display_help("the scene's, else desktop"), help_heading = "Seeing")]
     display: Option<String>,
-    /// Threshold model that drives the sampling; csf-unmasked and tvi-masked show what a part of csf-bands is worth. Only
-    /// csf-bands can judge denoised pictures.
+    /// Threshold model that drives the sampling; csf-unmasked and tvi-masked show what a part of csf-bands is worth.
+    /// Only csf-bands can judge denoised pictures.
     #[arg(long, value_name = "NAME", value_parser = model_values(), default_value = model::DEFAULT, help_heading = "Seeing")]
     model: String,
     /// Area in deg² over which the eye sums contrast [default: the display's, else 1].
@@ -125,8 +126,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true, help_heading = "Seeing")]
     nits_per_unit: Option<f64>,
 
-    /// Take the noise out of the picture, and judge what can then be seen: by the built-in filter, or by Open Image Denoise
-    /// where it is installed. An EXR keeps the raw mean beside it.
+    /// Take the noise out of the picture, and judge what can then be seen: by the built-in filter, or by Open Image
+    /// Denoise where it is installed. An EXR keeps the raw mean beside it.
     #[arg(long, value_enum, default_value = "none", help_heading = "Picture")]
     denoise: DenoiseChoice,
     /// Leave out what surrounds the scene and write alpha: straight in PNG, premultiplied in EXR.
@@ -212,15 +213,16 @@ impl JobArguments {
         Ok(scene)
     }
 
-    /// Loads the scene and reads everything else that is named. A part is shown as the whole is; and of a picture with alpha a glimpse knows
-    /// what is there, where eyes would take the rest of a film for darkness.
+    /// Loads the scene and reads everything else that is named. A part is shown as the whole is; and of a picture
+    /// with alpha a glimpse knows what is there, where eyes would take the rest of a film for darkness.
     pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
         let mut prepared = self.prepare_samples()?;
         prepared.fit_to_whole(None);
         Ok(prepared)
     }
 
-    /// The same before a part is shown as the whole is: for who takes samples alone, and who may know how the whole is shown.
+    /// The same before a part is shown as the whole is: for who takes samples alone, and who may know how the whole
+    /// is shown.
     pub(super) fn prepare_samples(&self) -> anyhow::Result<Prepared> {
         let scene = self.load_at(self.at, Some(console::texture_decoded))?;
         for note in &scene.notes {
@@ -247,8 +249,8 @@ impl JobArguments {
 }
 
 impl Prepared {
-    /// Shows a part as the whole is shown, and what there is of a picture with alpha to eyes that would take the rest for darkness: as it
-    /// was before where that is known, or by a glimpse of the whole.
+    /// Shows a part as the whole is shown, and what there is of a picture with alpha to eyes that would take the rest
+    /// for darkness: as it was before where that is known, or by a glimpse of the whole.
     pub(super) fn fit_to_whole(&mut self, known: Option<SavedTone>) {
         let Self { scene, trace, record, settings, whole } = self;
         if trace.crop.is_some() || (trace.transparent && settings.operator.counts_darkness()) {
@@ -279,8 +281,8 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
     })
 }
 
-/// How light all of the picture is, at its own size, as operators that count degrees need it: a part is shown as it is shown in the
-/// whole. `None` for pictures too large to be looked at as a whole.
+/// How light all of the picture is, at its own size, as operators that count degrees need it: a part is shown as it
+/// is shown in the whole. `None` for pictures too large to be looked at as a whole.
 fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> {
     /// 8192×4096, for which a third of a gigabyte is taken.
     const MAX_PIXELS: u64 = 1 << 25;

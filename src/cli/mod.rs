@@ -50,8 +50,8 @@ struct CommandLine {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Render a scene until nothing more can be seen, or until a limit. Exits with 75 where a signal stopped it early: --resume
-    /// goes on from its --checkpoint.
+    /// Render a scene until nothing more can be seen, or until a limit. Exits with 75 where a signal stopped it
+    /// early: --resume goes on from its --checkpoint.
     Render(Box<render::RenderArguments>),
     /// Show a render in a browser while it is made: layers, live exposure and camera, stop, save.
     View(Box<view::ViewArguments>),

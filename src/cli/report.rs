@@ -58,7 +58,8 @@ pub(super) struct DenoisedReport {
     /// Visibility of the noise that is left, and of what the denoiser changed, at the 99th percentile.
     variance_visibility_p99: Option<f64>,
     bias_visibility_p99: Option<f64>,
-    /// Share of pixels called fine where raw noise is too strong to show that bias stays below one and a half times the target.
+    /// Share of pixels called fine where raw noise is too strong to show that bias stays below one and a half times
+    /// the target.
     unproven_fraction: Option<f64>,
     /// Squared bias over squared variance as the whole picture shows it, by octave band from 0.5 cycles a degree on.
     bias_factors: Vec<f64>,
@@ -121,10 +122,11 @@ pub(super) struct Report {
     /// What made the picture out of the mean, and what can be seen of what it left and of what it changed.
     denoised: Option<DenoisedReport>,
     visibility_target: Option<f64>,
-    /// Probability with which visibilities and chances here are no less than the truth, at this look and all before; none where they are
-    /// estimates.
+    /// Probability with which visibilities and chances here are no less than the truth, at this look and all before;
+    /// none where they are estimates.
     confidence: Option<f64>,
-    /// None here and in the figures that follow from it where the samples are too few to tell, as in a render of one a pixel.
+    /// None here and in the figures that follow from it where the samples are too few to tell, as in a render of one
+    /// a pixel.
     visibility_p99: Option<f64>,
     visibility_p999: Option<f64>,
     visibility_max: Option<f64>,
@@ -134,21 +136,23 @@ pub(super) struct Report {
     detection_probability_p99: Option<f64>,
     /// Expected number of 1° patches in which noise is noticed.
     patches_noticed: Option<f64>,
-    /// Energy of the halves' difference through the eye's filter over the predicted energy; 1 when the prediction holds.
+    /// Energy of the halves' difference through the eye's filter over the predicted energy; 1 when the prediction
+    /// holds.
     measured_over_predicted: Option<f64>,
-    /// Visible energy of fresh samples against the kept ones in audited tiles, over the predicted; none for small pictures.
+    /// Visible energy of fresh samples against the kept ones in audited tiles, over the predicted; none for small
+    /// pictures.
     audit_ratio: Option<f64>,
     audit_standard_error: Option<f64>,
     audit_tiles: usize,
     /// What audits multiplied the variance by.
     variance_inflation: f64,
-    /// Pixels whose halves differ by more than five standard errors of what their neighbours show: light that few samples
-    /// find (fireflies).
+    /// Pixels whose halves differ by more than five standard errors of what their neighbours show: light that few
+    /// samples find (fireflies).
     outlier_pixels: usize,
     /// Share of the picture's energy by which they stand out.
     outlier_energy_share: f64,
-    /// Least and greatest number that thresholds are multiplied by, where a map of importance was given. All visibilities and
-    /// chances here are under it.
+    /// Least and greatest number that thresholds are multiplied by, where a map of importance was given. All
+    /// visibilities and chances here are under it.
     importance_range: Option<[f32; 2]>,
     /// Whose eye all visibilities and chances here are of: what it looks at.
     eye: String,

@@ -19,15 +19,15 @@ pub(super) struct Staging {
     /// Camera of the scene file, by name.
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
-    /// Surroundings instead of the scene's: a lat-long picture (.hdr, .exr, .png), sky:ELEVATION[,AZIMUTH[,TURBIDITY]] in
-    /// degrees, or constant:CD_M2.
+    /// Surroundings instead of the scene's: a lat-long picture (.hdr, .exr, .png),
+    /// sky:ELEVATION[,AZIMUTH[,TURBIDITY]] in degrees, or constant:CD_M2.
     #[arg(long, value_name = "FILE|sky:...", value_parser = parse_surroundings, allow_negative_numbers = true)]
     environment: Option<Surroundings>,
     /// Look from one point to another: X,Y,Z,X,Y,Z, and the vertical field of view in degrees if wanted.
     #[arg(long, value_name = "FROM,TO[,FOV]", value_parser = parse_look_at, allow_hyphen_values = true, conflicts_with = "camera")]
     look_at: Option<LookAt>,
-    /// Most memory for decoded textures, of one frame where there are several: beyond it the largest are halved until they fit. No
-    /// limit unless told.
+    /// Most memory for decoded textures, of one frame where there are several: beyond it the largest are halved until
+    /// they fit. No limit unless told.
     #[arg(long, value_name = "MB", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true)]
     texture_memory: Option<u32>,
 }

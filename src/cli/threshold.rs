@@ -31,27 +31,28 @@ use std::path::{Path, PathBuf};
 /// Arguments of `threshold`.
 #[derive(Debug, Args)]
 pub(super) struct ThresholdArguments {
-    /// Picture of any renderer, taken to be without noise unless it is the mean of the halves' values: the noise of that is known by them,
-    /// and csf-bands does not take it for detail that hides noise.
+    /// Picture of any renderer, taken to be without noise unless it is the mean of the halves' values: the noise of
+    /// that is known by them, and csf-bands does not take it for detail that hides noise.
     input: PathBuf,
     /// EXR file to write: threshold.Y (standard error in display cd/m² at visibility 1), adaptation.Y and, with
     /// --halves, visibility.Y by the model's thresholds, and by those of colour where the model is csf-bands.
     #[arg(short, long, value_name = "FILE.exr")]
     output: PathBuf,
-    /// Two renders with independent samples: half of their difference is the noise that is judged, by csf-bands in luminance and in colour
-    /// (by castleCSF's, as at rest), of which the more visible counts; by any other model in luminance alone.
+    /// Two renders with independent samples: half of their difference is the noise that is judged, by csf-bands in
+    /// luminance and in colour (by castleCSF's, as at rest), of which the more visible counts; by any other model in
+    /// luminance alone.
     #[arg(long, num_args = 2, value_names = ["A", "B"])]
     halves: Option<Vec<PathBuf>>,
-    /// Motion in pixels a frame, for error that travels with what is shown. For the models csf-bands, yee and tvi-masked; the
-    /// others know no motion.
+    /// Motion in pixels a frame, for error that travels with what is shown. For the models csf-bands, yee and
+    /// tvi-masked; the others know no motion.
     #[arg(long, value_name = "FILE.exr")]
     velocity: Option<PathBuf>,
-    /// Frames a second of --velocity. Without it as its file says (frames of `animate` do), else the display's, which is 60 unless its
-    /// own file says otherwise.
+    /// Frames a second of --velocity. Without it as its file says (frames of `animate` do), else the display's, which
+    /// is 60 unless its own file says otherwise.
     #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, requires = "velocity")]
     fps: Option<f64>,
-    /// Let the eye follow only what stands out in the picture and in its motion (Itti 1998, Yee 2001): what moves elsewhere is
-    /// seen less well. Without it, it follows everything.
+    /// Let the eye follow only what stands out in the picture and in its motion (Itti 1998, Yee 2001): what moves
+    /// elsewhere is seen less well. Without it, it follows everything.
     #[arg(long, requires = "velocity")]
     saliency: bool,
     /// Add the veil that bright things cast inside the eye (CIE), for an observer of this age (25 if none is given).
@@ -60,8 +61,9 @@ pub(super) struct ThresholdArguments {
     /// Threshold model.
     #[arg(long, value_name = "NAME", value_parser = model_values(), default_value = model::DEFAULT)]
     model: String,
-    /// Tone operator that shows scene-linear pictures, fitted to the input, or to the halves where only they are ones [default: as that
-    /// one was shown when it was rendered, if its file says so and the display is as bright and dark, else constant].
+    /// Tone operator that shows scene-linear pictures, fitted to the input, or to the halves where only they are ones
+    /// [default: as that one was shown when it was rendered, if its file says so and the display is as bright and
+    /// dark, else constant].
     #[arg(long, value_name = "NAME", value_parser = operator_values())]
     operator: Option<String>,
     #[command(flatten)]

@@ -26,16 +26,18 @@ use std::path::{Path, PathBuf};
 /// Arguments of `tonemap`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct TonemapArguments {
-    /// Pictures (.exr, .hdr); several are a sequence in time, by the numbers in their names where all have different ones, and else as they
-    /// are given.
+    /// Pictures (.exr, .hdr); several are a sequence in time, by the numbers in their names where all have different
+    /// ones, and else as they are given.
     #[arg(required = true, num_args = 1..)]
     input: Vec<PathBuf>,
-    /// .png (16-bit PQ for an HDR display, sRGB for all others, which colour management brings to them), .exr with what the
-    /// display emits in units of its white: `absolute` shows that as it is. The name of a sequence has # for each digit of the frame's number:
-    /// night.####.png. Numbers are those in the inputs' names where all have different ones, and else count from 1.
+    /// .png (16-bit PQ for an HDR display, sRGB for all others, which colour management brings to them), .exr with
+    /// what the display emits in units of its white: `absolute` shows that as it is. The name of a sequence has # for
+    /// each digit of the frame's number: night.####.png. Numbers are those in the inputs' names where all have
+    /// different ones, and else count from 1.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Tone operator, or "all" for a sheet with all of them [default: as the picture was shown when it was rendered, if its file says so].
+    /// Tone operator, or "all" for a sheet with all of them [default: as the picture was shown when it was rendered,
+    /// if its file says so].
     #[arg(long, value_name = "NAME|all", value_parser = operator_values_or_all())]
     operator: Option<String>,
     /// Exposure correction in stops.
@@ -51,8 +53,8 @@ pub(super) struct TonemapArguments {
     /// What the eye is adapted to: the view as a whole, or, for the operators that know it, each place of it.
     #[arg(long, value_enum, default_value = "world")]
     adaptation: Scope,
-    /// What else the eye loses, in place of what the operator's authors chose. ward-larson97 knows all three, ferwerda96
-    /// acuity.
+    /// What else the eye loses, in place of what the operator's authors chose. ward-larson97 knows all three,
+    /// ferwerda96 acuity.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     effects: Option<Vec<Effect>>,
 

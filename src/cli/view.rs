@@ -33,8 +33,8 @@ pub(super) struct ViewArguments {
     /// Address to listen on. Others than this machine's own let everybody in who has the printed address.
     #[arg(long, value_name = "IP", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Serving")]
     host: IpAddr,
-    /// Take the pointer for the gaze: thresholds rise away from it, as castleCSF says, and samples go where one looks first.
-    /// Outside the picture it stands for nothing, and the whole picture counts as looked at.
+    /// Take the pointer for the gaze: thresholds rise away from it, as castleCSF says, and samples go where one looks
+    /// first. Outside the picture it stands for nothing, and the whole picture counts as looked at.
     #[arg(long, help_heading = "Seeing")]
     foveated: bool,
     #[command(flatten)]

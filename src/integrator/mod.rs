@@ -1,9 +1,10 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
-//! `path` holds the life of one sample, `path_packet` how several are followed at once, `camera` where they start, `around_camera` in which
-//! volumes, `shading` what a surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand,
-//! `media` what a ray travels in, `light_probes` what light comes where, `prune` which light is left to chance, `thin_sheets` what clear panes
-//! let through, `specular` what mirrors and glass show, `small_things` what samples may pass by.
+//! `path` holds the life of one sample, `path_packet` how several are followed at once, `camera` where they start,
+//! `around_camera` in which volumes, `shading` what a surface point scatters like, `relief` how maps turn its normal,
+//! `tables` what materials compute beforehand, `media` what a ray travels in, `light_probes` what light comes where,
+//! `prune` which light is left to chance, `thin_sheets` what clear panes let through, `specular` what mirrors and
+//! glass show, `small_things` what samples may pass by.
 
 mod around_camera;
 mod camera;
@@ -52,8 +53,8 @@ pub struct TraceSettings {
     pub max_depth: u32,
     /// Reconstruction filter.
     pub filter: PixelFilter,
-    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
-    /// light is rare. `None` leaves the estimate unbiased.
+    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture
+    /// where light is rare. `None` leaves the estimate unbiased.
     pub clamp: Option<f32>,
     /// How the samples of neighbouring pixels relate.
     pub sequence: Sequence,
@@ -280,9 +281,9 @@ impl PathTracer {
         self.trace_into(plan, self.settings.seed, &mut |work, sum| film.merge_block(work, sum), progress);
     }
 
-    /// Takes the samples of the first blocks into the film, as many as make one batch, and says how many blocks that was:
-    /// at least one, unless there is none. Batches leave the caller a moment to look around; the film does not depend on
-    /// where they end.
+    /// Takes the samples of the first blocks into the film, as many as make one batch, and says how many blocks that
+    /// was: at least one, unless there is none. Batches leave the caller a moment to look around; the film does not
+    /// depend on where they end.
     pub fn trace_batch(&self, blocks: &[BlockWork], film: &mut Film, progress: &(dyn Fn(u64) + Sync)) -> usize {
         self.batch_into(blocks, self.settings.seed, &mut |work, sum| film.merge_block(work, sum), progress)
     }
@@ -353,7 +354,8 @@ impl PathTracer {
     }
 }
 
-/// Samples after which a chunk of a batch is full: as many chunks as asked for where a batch is small, as a preview's are.
+/// Samples after which a chunk of a batch is full: as many chunks as asked for where a batch is small, as a preview's
+/// are.
 fn samples_per_chunk(batch: &[BlockWork], chunks: usize) -> u64 {
     const LEAST: u64 = 64;
     const MOST: u64 = 2_048;
@@ -366,7 +368,8 @@ mod tests {
     use super::*;
     use crate::sampler::Half;
 
-    /// A sample without end is as bright as the clamp lets it be; it was none at all, and the mean one of fewer samples.
+    /// A sample without end is as bright as the clamp lets it be; it was none at all, and the mean one of fewer
+    /// samples.
     #[test]
     fn clamps_hold_what_is_infinite() {
         let settings = TraceSettings { clamp: Some(8.0), ..TraceSettings::new(1, 1, 0) };

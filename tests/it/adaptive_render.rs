@@ -54,7 +54,8 @@ impl Judged {
     }
 }
 
-/// Σ error² over Σ (predicted + reference variance) of some pixels, and the ratio's standard error if errors are normal.
+/// Σ error² over Σ (predicted + reference variance) of some pixels, and the ratio's standard error if errors are
+/// normal.
 struct Calibration {
     ratio: f64,
     standard_error: f64,
@@ -83,9 +84,9 @@ fn away_from_the_lamp(reference: &Judged, size: usize) -> Vec<usize> {
 }
 
 /// Mean luminance within 0.5 % of a 4096-spp reference of another seed, and within 3.5 standard errors (significance
-/// 5e-4). Variance estimates are calibrated: the ratio is 1 ± 0.1 over the picture less the lamp and its border. The few
-/// pixels there hold nearly all of Σ error² (some 40 effective degrees of freedom: ±20 % by chance), so over the whole
-/// picture the tolerance is 3.5 standard errors of the ratio itself.
+/// 5e-4). Variance estimates are calibrated: the ratio is 1 ± 0.1 over the picture less the lamp and its border. The
+/// few pixels there hold nearly all of Σ error² (some 40 effective degrees of freedom: ±20 % by chance), so over the
+/// whole picture the tolerance is 3.5 standard errors of the ratio itself.
 #[test]
 fn uniform_and_adaptive_renders_agree_with_a_reference() {
     let reference = Judged::of(&render_cornell(128, 1001, Sampling::Uniform, None, Some(4096)));
@@ -151,8 +152,8 @@ fn a_preview_is_a_prefix_of_the_final_picture() {
     assert_eq!(preview.film, stopped.film);
 }
 
-/// A render whose looks and audits are broken off here and there, and which goes on from its state each time, ends with the
-/// same film: a preview's looks end when somebody wants another picture.
+/// A render whose looks and audits are broken off here and there, and which goes on from its state each time, ends
+/// with the same film: a preview's looks end when somebody wants another picture.
 #[test]
 fn looks_that_are_broken_off_change_nothing() {
     let scene = Arc::new(load_cornell_box());
@@ -191,8 +192,8 @@ fn adaptive_sampling_adapts_and_stops() {
     assert_eq!(rendered.stop_reason, fechner::adaptive::StopReason::Visibility);
 }
 
-/// A budget that ends the render above threshold leaves hardly more squared error, in units of what can be seen, than even counts, though it
-/// is spent where most is to be seen.
+/// A budget that ends the render above threshold leaves hardly more squared error, in units of what can be seen, than
+/// even counts, though it is spent where most is to be seen.
 #[test]
 fn a_budget_is_spent_for_the_whole_picture() {
     const SIZE: u32 = 48;
@@ -209,8 +210,9 @@ fn a_budget_is_spent_for_the_whole_picture() {
     };
     let ratio = squared_error(Sampling::Adaptive) / squared_error(Sampling::Uniform);
     eprintln!("squared error over that of even counts: {ratio:.3}");
-    // By 60 seeds 1.04, with a standard error of 0.02, or 0.04 for twelve; 0.97 before masks were bounded from above, too, and counted by how
-    // well they are seen, both of which raise thresholds along the lamp's edge, by 2 to 5 %. Nearly all of it is there.
+    // By 60 seeds 1.04, with a standard error of 0.02, or 0.04 for twelve; 0.97 before masks were bounded from above,
+    // too, and counted by how well they are seen, both of which raise thresholds along the lamp's edge, by 2 to 5 %.
+    // Nearly all of it is there.
     assert!(ratio < 1.16, "{ratio}");
 }
 
@@ -275,8 +277,8 @@ impl Monitor for Left {
     fn samples_done(&self, _: u64) {}
 }
 
-/// What is left goes by the limit that comes first, and is nothing at the end: with 17 samples at most "about 6 h 35 min left" was said
-/// of a render that had ended. An odd limit is taken whole: adaptive sampling ended at 16.
+/// What is left goes by the limit that comes first, and is nothing at the end: with 17 samples at most "about 6 h 35
+/// min left" was said of a render that had ended. An odd limit is taken whole: adaptive sampling ended at 16.
 #[test]
 fn nothing_is_left_of_a_render_that_ends() {
     let scene = Arc::new(load_cornell_box());
@@ -375,7 +377,8 @@ impl Monitor for Leaver {
     }
 }
 
-/// Every look is in a render's seconds: the last one of a rule that knows no sight was not, nor that at a render that was left.
+/// Every look is in a render's seconds: the last one of a rule that knows no sight was not, nor that at a render that
+/// was left.
 #[test]
 fn every_look_is_in_the_seconds() {
     const ASLEEP: Duration = Duration::from_millis(20);
@@ -420,8 +423,8 @@ fn remains_of_a_budget_take_no_look() {
     assert!(ends.iter().all(|&(_, left)| left < 23 * 21 / 16), "not much is left: {ends:?}");
 }
 
-/// Where a budget leaves hardly more than the pilot, no look before the last one: it would cost more than it is worth. What is left is
-/// spent evenly, to the last sample.
+/// Where a budget leaves hardly more than the pilot, no look before the last one: it would cost more than it is
+/// worth. What is left is spent evenly, to the last sample.
 #[test]
 fn a_budget_that_the_pilot_nearly_spends_takes_one_look() {
     let scene = Arc::new(load_cornell_box());

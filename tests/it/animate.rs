@@ -120,7 +120,8 @@ fn frames_of_another_rate_are_made_anew() {
     assert!(!said("60").contains("is there"));
 }
 
-/// The operator's settings are a frame's own as much as its name, from the command line and from the scene, budget or not.
+/// The operator's settings are a frame's own as much as its name, from the command line and from the scene, budget or
+/// not.
 #[test]
 fn another_exposure_makes_frames_anew() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -140,7 +141,8 @@ fn another_exposure_makes_frames_anew() {
     }
 }
 
-/// Pictures of another format, other settings or other bytes than their record's are frames to be made, for the shot as well.
+/// Pictures of another format, other settings or other bytes than their record's are frames to be made, for the shot
+/// as well.
 #[test]
 fn what_a_run_would_make_otherwise_is_not_there() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -213,8 +215,8 @@ fn videos_of_hdr_frames_are_not_hdr() {
     assert!(far <= Some(2), "{far:?} codes apart");
 }
 
-/// Noise that is gone in the next frame may be stronger than in a picture that somebody looks at for long: 2.3 times fewer samples, one
-/// seed's ratio scattering by 0.25.
+/// Noise that is gone in the next frame may be stronger than in a picture that somebody looks at for long: 2.3 times
+/// fewer samples, one seed's ratio scattering by 0.25.
 #[test]
 fn motion_needs_fewer_samples_than_a_pause() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -234,8 +236,8 @@ fn motion_needs_fewer_samples_than_a_pause() {
     assert!(2.0 * moving < paused, "{moving} and {paused} samples");
 }
 
-/// Away from where viewers look, noise may stay: a corner that is looked at costs less than everything, and a frame without a line
-/// as much as a shot without gazes.
+/// Away from where viewers look, noise may stay: a corner that is looked at costs less than everything, and a frame
+/// without a line as much as a shot without gazes.
 #[test]
 fn frames_are_judged_from_where_they_are_looked_at() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -327,8 +329,8 @@ fn bad_arguments_are_named() {
     }
 }
 
-/// A sequence does not differ from itself; flicker of its light does, and the same change that stays does not where it is
-/// small.
+/// A sequence does not differ from itself; flicker of its light does, and the same change that stays does not where
+/// it is small.
 #[test]
 fn sequences_are_compared_as_they_move() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -432,8 +434,9 @@ fn a_shot_may_begin_in_the_dark() {
     assert!(brightest(2) > Some(100));
 }
 
-/// Whichever sequence holds the scene's light is shown as it was rendered: it looks like its own frames for the display, where eyes
-/// adapt from frame to frame, too. An operator that is asked for is fitted to it, whether it is the reference or not.
+/// Whichever sequence holds the scene's light is shown as it was rendered: it looks like its own frames for the
+/// display, where eyes adapt from frame to frame, too. An operator that is asked for is fitted to it, whether it is
+/// the reference or not.
 #[test]
 fn a_sequence_for_the_display_is_compared_with_one_of_light() {
     let folder = tempfile::tempdir().expect("a folder");

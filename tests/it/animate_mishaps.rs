@@ -40,7 +40,8 @@ fn animate(folder: &Path, scene: &str, arguments: &[&str]) -> (Option<i32>, Stri
     (output.status.code(), said(&output))
 }
 
-/// A camera that looks along its up in the frame after the last: the shot was refused when all but its last frame were rendered.
+/// A camera that looks along its up in the frame after the last: the shot was refused when all but its last frame
+/// were rendered.
 #[test]
 fn a_frame_beyond_the_end_that_cannot_be_read_is_told_first() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -72,7 +73,8 @@ fn what_changes_nothing_is_refused() {
     }
 }
 
-/// Budgets that cannot be kept, parts that have an exposure each and shutters longer than a frame are named, and nothing else is.
+/// Budgets that cannot be kept, parts that have an exposure each and shutters longer than a frame are named, and
+/// nothing else is.
 #[test]
 fn what_is_not_as_meant_is_named() {
     let folder = tempfile::tempdir().expect("a folder");

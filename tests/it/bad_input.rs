@@ -68,8 +68,8 @@ fn our_own_scenes_load_and_survive_every_cut() {
     }
 }
 
-/// Writes cuts of a good file, and the file with single bytes overwritten, in its place, and loads the scene: a scene or one line,
-/// never a panic. 61 cuts, every third of the first 400 bytes, and one in 61 of all.
+/// Writes cuts of a good file, and the file with single bytes overwritten, in its place, and loads the scene: a scene
+/// or one line, never a panic. 61 cuts, every third of the first 400 bytes, and one in 61 of all.
 fn survive_damage(scene: &Path, damaged: &Path, good: &[u8]) {
     let load_scene = || {
         if let Err(error) = load(scene, &LoadOptions::default()) {

@@ -98,7 +98,8 @@ fn damaged_files_are_made_anew() {
     assert!(!run().contains("refused"));
 }
 
-/// Scenes of one file name in two folders are two scenes: each has its own figures, compared with its own uniform render.
+/// Scenes of one file name in two folders are two scenes: each has its own figures, compared with its own uniform
+/// render.
 #[test]
 fn scenes_of_one_name_are_told_apart() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -137,7 +138,8 @@ fn bounds_need_no_arms_and_unknown_arms_are_refused() {
     assert!(told.contains("magic") && told.contains("no-masking"), "{told}");
 }
 
-/// Uniform sampling is a rule like others: its samples are enough for the optimum, too, where it needs fewer than a pilot.
+/// Uniform sampling is a rule like others: its samples are enough for the optimum, too, where it needs fewer than a
+/// pilot.
 #[test]
 fn no_rule_beats_the_bound() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -66,7 +66,8 @@ fn mean_of_columns(text: &str, columns: std::ops::Range<u32>) -> [f32; 3] {
     std::array::from_fn(|c| pixels.iter().map(|&pixel| rgb[pixel][c]).sum::<f32>() / pixels.len() as f32)
 }
 
-/// A camera that leaves an absorbing box, one that is left by it, and parallel rays that begin in it and beside it: each ray knows.
+/// A camera that leaves an absorbing box, one that is left by it, and parallel rays that begin in it and beside it:
+/// each ray knows.
 #[test]
 fn each_ray_knows_what_it_begins_in() {
     const ABSORPTION: [f32; 3] = [1.0, 0.5, 0.1];
@@ -216,8 +217,8 @@ fn a_crop_is_a_part_of_the_whole() {
     }
 }
 
-/// With a transparent background, pixels beside the lamp see nothing of the sky and are not covered, while the sky still
-/// lights what stands in it.
+/// With a transparent background, pixels beside the lamp see nothing of the sky and are not covered, while the sky
+/// still lights what stands in it.
 #[test]
 fn a_transparent_background_leaves_the_light() {
     let mut scene = empty_scene();
@@ -235,8 +236,8 @@ fn a_transparent_background_leaves_the_light() {
     assert!((area / (std::f64::consts::PI * radius * radius) - 1.0).abs() < 0.005, "{area}");
 }
 
-/// Keyframes of a file move things while the shutter is open, from the frame's time on: at shares of the shutter they are
-/// where the keyframes say, also where a keyframe lies within it.
+/// Keyframes of a file move things while the shutter is open, from the frame's time on: at shares of the shutter they
+/// are where the keyframes say, also where a keyframe lies within it.
 #[test]
 fn keyframes_move_things_while_the_shutter_is_open() {
     let text = r#"
@@ -280,8 +281,8 @@ fn keyframes_move_things_while_the_shutter_is_open() {
     assert!(!still.moves(), "after the last keyframe everything rests");
 }
 
-/// Keyframes of materials and lights: what they say at the frame's time, as if it had been written; what is wrong is named
-/// with the keyframes' line.
+/// Keyframes of materials and lights: what they say at the frame's time, as if it had been written; what is wrong is
+/// named with the keyframes' line.
 #[test]
 fn lights_and_materials_change_in_time() {
     let of = |light: &str, material: &str| {

@@ -94,8 +94,8 @@ fn assert_same(one: &Rendered, other: &Rendered) {
     assert_eq!(one.stop_reason, other.stop_reason);
 }
 
-/// Stopped at visibility 8 and continued to 4, by way of a file, is 4 in one go, and 1 continued to 0.5 is 0.5; so it is when
-/// `--plans` stopped it.
+/// Stopped at visibility 8 and continued to 4, by way of a file, is 4 in one go, and 1 continued to 0.5 is 0.5; so it
+/// is when `--plans` stopped it.
 #[test]
 fn a_render_that_is_continued_equals_one_in_one_go() {
     let setup = Setup::new(5);
@@ -114,7 +114,8 @@ fn a_render_that_is_continued_equals_one_in_one_go() {
     }
 }
 
-/// So it is where looks at a denoised picture are far apart: the one that ended the first part is the straight way's, too.
+/// So it is where looks at a denoised picture are far apart: the one that ended the first part is the straight way's,
+/// too.
 #[test]
 fn a_denoised_render_that_is_continued_equals_one_in_one_go() {
     let path = repository_scene("product.toml");
@@ -135,7 +136,8 @@ fn a_denoised_render_that_is_continued_equals_one_in_one_go() {
     assert_same(&continued, &render(&tracer, &to(1.0), &Quiet).expect("renders"));
 }
 
-/// A render that goes on to fewer samples than were planned takes no more than it may now; with nothing traced, its pilot is cut.
+/// A render that goes on to fewer samples than were planned takes no more than it may now; with nothing traced, its
+/// pilot is cut.
 #[test]
 fn tighter_limits_hold_for_what_was_planned() {
     let setup = Setup::new(5);
@@ -267,8 +269,8 @@ fn films_of_different_seeds_add_up() {
             assert!((pixel.sample_variance(0) - variance).abs() <= 1e-5 * variance, "pixel {i}");
         }
     }
-    // Σ (A − B)² falls with the count: 128 samples against 32, in stratified sampling at least fourfold less the chance of
-    // a ratio of two sums over 1600 pixels, heavy tails included.
+    // Σ (A − B)² falls with the count: 128 samples against 32, in stratified sampling at least fourfold less the
+    // chance of a ratio of two sums over 1600 pixels, heavy tails included.
     let scatter = |film: &Film| {
         let difference = |i: usize| film.half(Half::A)[i].mean[1] - film.half(Half::B)[i].mean[1];
         (0..film.half(Half::A).len()).map(|i| difference(i).powi(2)).sum::<f64>()
@@ -307,7 +309,8 @@ fn films_of_one_sample_make_two_halves() {
     assert_eq!(alone.state.film, read_checkpoint(&films[0]).expect("readable").state.film);
 }
 
-/// The strictest aim stays, and a film that aimed at none takes none away: 0, by which it says so, was taken for the strictest.
+/// The strictest aim stays, and a film that aimed at none takes none away: 0, by which it says so, was taken for the
+/// strictest.
 #[test]
 fn merged_films_aim_at_what_the_strictest_aimed_at() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -397,7 +400,8 @@ fn damaged_files_are_refused() {
     println!("{refused} of {} changes under a fitting checksum are refused", 5 * payload.len());
 }
 
-/// What is to come before the next look at a denoised picture comes back from a file; that of a picture of another size is refused.
+/// What is to come before the next look at a denoised picture comes back from a file; that of a picture of another
+/// size is refused.
 #[test]
 fn what_a_look_decided_belongs_to_its_picture() {
     let setup = Setup::new(1);

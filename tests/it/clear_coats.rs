@@ -1,4 +1,5 @@
-//! Clear coats of glTF: smooth over a bumpy base unless they have bumps of their own, and darkening what shines beneath them.
+//! Clear coats of glTF: smooth over a bumpy base unless they have bumps of their own, and darkening what shines
+//! beneath them.
 
 use crate::support::{radiance_along, trace_settings};
 use fechner::geometry::Ray;
@@ -9,7 +10,8 @@ use serde_json::{Value, json};
 use std::f32::consts::FRAC_PI_6;
 use std::sync::Arc;
 
-/// The scene of `objects`, each a square of 2 × 2 units around its node's origin that faces the node's +z, by these materials.
+/// The scene of `objects`, each a square of 2 × 2 units around its node's origin that faces the node's +z, by these
+/// materials.
 fn tracer(materials: &Value, objects: &[Value]) -> PathTracer {
     let folder = tempfile::tempdir().unwrap();
     // Normals that lean by 15° towards u.
@@ -74,8 +76,9 @@ fn seen_from(tracer: &PathTracer, angle: f32) -> f32 {
     radiance_along(tracer, Ray::new(5.0 * towards, -towards), 4, 4096).0.y
 }
 
-/// "If clearcoatNormalTexture is not given, no normal mapping is applied to the clear coat layer, even if normal mapping is applied to
-/// the base material" (KHR_materials_clearcoat). A coat of index 1.5 reflects 0.04 face on, and 0.0401 at 15°.
+/// "If clearcoatNormalTexture is not given, no normal mapping is applied to the clear coat layer, even if normal
+/// mapping is applied to the base material" (KHR_materials_clearcoat). A coat of index 1.5 reflects 0.04 face on, and
+/// 0.0401 at 15°.
 #[test]
 fn a_coat_is_smooth_over_bumps_unless_it_has_its_own() {
     let bumpy = json!({"normalTexture": {"index": 0}});
@@ -97,8 +100,8 @@ fn a_coat_is_smooth_over_bumps_unless_it_has_its_own() {
     }
 }
 
-/// What lies beneath keeps its bumps: a white base whose normals lean by 15° sees a small lamp overhead at that angle, through a coat
-/// that passes 0.96 both ways face on.
+/// What lies beneath keeps its bumps: a white base whose normals lean by 15° sees a small lamp overhead at that
+/// angle, through a coat that passes 0.96 both ways face on.
 #[test]
 fn what_lies_beneath_a_smooth_coat_keeps_its_bumps() {
     let white = json!({"normalTexture": {"index": 0},

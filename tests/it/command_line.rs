@@ -315,8 +315,8 @@ fn bad_arguments_are_refused_in_one_line() {
     assert_eq!(std::fs::read_dir(at).expect("readable").count(), 0, "something was written");
 }
 
-/// Two renders of different seeds at few samples differ visibly, a picture does not differ from itself, and the noise of
-/// the pair is above threshold; a file without a unit is refused.
+/// Two renders of different seeds at few samples differ visibly, a picture does not differ from itself, and the noise
+/// of the pair is above threshold; a file without a unit is refused.
 #[test]
 fn pictures_are_compared_and_thresholds_mapped() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -418,8 +418,8 @@ fn noise_is_judged_by_the_model_and_the_motion_asked_for() {
     }
 }
 
-/// An EXR with pixels twice as wide as high has thresholds as on a display that says so, and its ratio goes on into what is
-/// written.
+/// An EXR with pixels twice as wide as high has thresholds as on a display that says so, and its ratio goes on into
+/// what is written.
 #[test]
 fn oblong_pixels_of_a_file_are_honoured() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -39,7 +39,8 @@ fn assert_share(found: f32, expected: f32, what: &str) {
     assert!((found - expected).abs() < 4.0 * deviation, "{what}: {found}, expected {expected} ± {deviation}");
 }
 
-/// Two and four veils behind one another let a quarter and a sixteenth through, with meshes of their own and with a shared one.
+/// Two and four veils behind one another let a quarter and a sixteenth through, with meshes of their own and with a
+/// shared one.
 #[test]
 fn veils_multiply() {
     for (layers, expected) in [(1, 0.5), (2, 0.25), (4, 0.0625)] {

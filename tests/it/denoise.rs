@@ -69,8 +69,8 @@ fn the_summary_says_nothing_of_what_is_not_there() {
     assert!(said.contains("100.00 % of the picture is above") && !said.contains("Unproven"), "{said}");
 }
 
-/// A part of the error is not more than the whole: both are of the picture that is written, after it was moved towards the raw mean. What
-/// the denoiser changed was up to 1.18 times the whole here.
+/// A part of the error is not more than the whole: both are of the picture that is written, after it was moved
+/// towards the raw mean. What the denoiser changed was up to 1.18 times the whole here.
 #[test]
 fn no_part_of_the_error_is_more_than_the_whole() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -211,7 +211,8 @@ fn open_image_denoise_removes_noise_and_repeats_itself() {
         (squares.sum::<f32>() / denoised.len() as f32).sqrt()
     };
     let first = denoised(&one, 4.0);
-    // 1.5 where the library takes the guides for noisy, 1.4 where a small network denoises them, 0.8 where it trusts them.
+    // 1.5 where the library takes the guides for noisy, 1.4 where a small network denoises them, 0.8 where it trusts
+    // them.
     for deviation in [deviation(&first), deviation(&denoised(&one, 64.0))] {
         assert!(deviation < 1.1, "{deviation} of 17, and bricks 10 to each side of their mean");
     }
@@ -219,8 +220,8 @@ fn open_image_denoise_removes_noise_and_repeats_itself() {
     assert_eq!(first, denoised(&Oidn::open(2).expect("opens again"), 4.0), "the same on two");
 }
 
-/// An even grey of one pixel lost 74 % of its light, one of 2×2 won 37 %, of 3×3 25 %, of 5×5 3 %, of 1×32 9 %. Skipped with a message
-/// where the library is not installed.
+/// An even grey of one pixel lost 74 % of its light, one of 2×2 won 37 %, of 3×3 25 %, of 5×5 3 %, of 1×32 9 %.
+/// Skipped with a message where the library is not installed.
 #[test]
 fn open_image_denoise_keeps_the_light_of_small_pictures() {
     let library = match Oidn::open(1) {
@@ -330,7 +331,8 @@ fn an_audit_finds_what_a_denoiser_makes_up() {
     denoised.error.visibility = raw.predicted;
     let honest = scene.audited(1e3, 0);
     println!("{honest:?}, raw {audited_raw:?}");
-    // Other tiles, by the same measure but for the window. Below 1, since colour is predicted too and luminance alone is found.
+    // Other tiles, by the same measure but for the window. Below 1, since colour is predicted too and luminance alone
+    // is found.
     let ratio_of_raw = audited_raw.expect("large enough to audit").ratio;
     assert!((honest.ratio / ratio_of_raw - 1.0).abs() < 0.3 && !honest.disagrees(), "{honest:?}, {ratio_of_raw}");
 
@@ -358,7 +360,8 @@ fn half_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
 #[ignore = "a reference of 512 samples a pixel, a minute or more each scene"]
 fn audits_of_unproven_tiles_agree_with_a_reference() {
     const ROUNDS: u32 = 12;
-    /// Student's t of eleven degrees of freedom, 99 % on both sides together: rounds scatter by three times what they say in the mean.
+    /// Student's t of eleven degrees of freedom, 99 % on both sides together: rounds scatter by three times what they
+    /// say in the mean.
     const WITHIN_STANDARD_ERRORS: f64 = 3.106;
     for (name, spp) in [("cornell-box", 16), ("cornell-glass", 16), ("many-lights", 16)] {
         let scene = DenoisedScene::of(name, spp, 5);

@@ -97,8 +97,8 @@ fn a_disk_gives_its_closed_form() {
     }
 }
 
-/// Where a scene has its origin is no matter: lamps that stood there lost up to two thirds of their light to what is far away, since shadow
-/// rays ended by the rounding of the lamp's own coordinates and not by that of their length.
+/// Where a scene has its origin is no matter: lamps that stood there lost up to two thirds of their light to what is
+/// far away, since shadow rays ended by the rounding of the lamp's own coordinates and not by that of their length.
 #[test]
 fn lamps_at_the_origin_light_what_is_far() {
     const RADIUS: f32 = 0.1;
@@ -282,8 +282,8 @@ fn share_through_pane(outside: f32) -> f32 {
     (1.0 - face) / (1.0 + face)
 }
 
-/// Panes between a floor and lights that no path can meet: what each lets through, at its own angle, and nothing through a board
-/// nor through more panes than a path may have surfaces.
+/// Panes between a floor and lights that no path can meet: what each lets through, at its own angle, and nothing
+/// through a board nor through more panes than a path may have surfaces.
 #[test]
 fn lights_without_area_shine_through_panes() {
     let behind = |surfaces: &[Surface], light: &Light| {
@@ -315,8 +315,8 @@ fn lights_without_area_shine_through_panes() {
     }
 }
 
-/// Lamps that paths meet behind panes by themselves, too, shine through them once: a sun of the sun's size, which nearly only shadow
-/// rays find, a sun of 30°, a sky, and a ball near the floor, which both find.
+/// Lamps that paths meet behind panes by themselves, too, shine through them once: a sun of the sun's size, which
+/// nearly only shadow rays find, a sun of 30°, a sky, and a ball near the floor, which both find.
 #[test]
 fn lights_of_some_extent_shine_through_panes_once() {
     let panes = [pane(1.0), pane(0.5)];
@@ -346,8 +346,8 @@ fn lights_of_some_extent_shine_through_panes_once() {
     assert_irradiance_behind(2, scene, 0.0, ball, "ball");
 }
 
-/// Mean over directions of a disc around a cosine of 0.8 of cosine times transmittance, over the mean cosine's part of it: what a sun
-/// of irradiance 1, square to its middle, gives a floor.
+/// Mean over directions of a disc around a cosine of 0.8 of cosine times transmittance, over the mean cosine's part
+/// of it: what a sun of irradiance 1, square to its middle, gives a floor.
 fn mean_over_disc(radius: f32, through: impl Fn(f32) -> f32) -> f32 {
     let (mut sum, mut total) = (0.0f64, 0.0f64);
     let axis = Vec3::new(-0.6, 0.8, 0.0);
@@ -402,8 +402,8 @@ fn sky_and_disc_in_one_place_add_up() {
     assert!(error < 0.005 * both.0, "{error} of {}", both.0);
 }
 
-/// A lamp that is white above and black below gives nothing to the floor under it, and, turned over, all that it gives when it is white
-/// everywhere. The floor's point sees nothing of its upper half.
+/// A lamp that is white above and black below gives nothing to the floor under it, and, turned over, all that it
+/// gives when it is white everywhere. The floor's point sees nothing of its upper half.
 #[test]
 fn a_sphere_shines_where_its_picture_says() {
     let above = |turned: bool, pictured: bool| {
@@ -435,8 +435,8 @@ fn a_sphere_shines_where_its_picture_says() {
     assert!((pictured / plain - 1.0).abs() < 1e-3, "{pictured} and {plain}");
 }
 
-/// A lamp in an absorbing volume, whose boundary lets light through by refraction and diffusely: what light samples alone find (no ray
-/// meets the lamp) is what they and scattering find together (Z test, significance 1e-3).
+/// A lamp in an absorbing volume, whose boundary lets light through by refraction and diffusely: what light samples
+/// alone find (no ray meets the lamp) is what they and scattering find together (Z test, significance 1e-3).
 #[test]
 fn light_samples_and_scattering_cross_a_mixed_boundary_alike() {
     let absorption = Vec3::new(0.5, 2.0, 6.0);

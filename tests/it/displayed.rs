@@ -1,5 +1,5 @@
-//! `fechner compare` and `threshold` see what the display shows: colours that it clips, PQ and sRGB files, rods, acuity, the
-//! room's light.
+//! `fechner compare` and `threshold` see what the display shows: colours that it clips, PQ and sRGB files, rods,
+//! acuity, the room's light.
 
 use crate::support::command;
 use crate::support::pictures::{mean, write_light};
@@ -57,7 +57,8 @@ fn noise_beside_a_clipped_channel_is_seen() {
     }
 }
 
-/// Noise of red against green has no luminance: two such halves were 0.12 visible, while `compare` tells their mean from the truth at 3.0.
+/// Noise of red against green has no luminance: two such halves were 0.12 visible, while `compare` tells their mean
+/// from the truth at 3.0.
 #[test]
 fn noise_of_colour_is_seen_in_halves() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -93,7 +94,8 @@ fn halves_of_a_scene_are_fitted_where_the_guide_is_none() {
     assert!(seen > 1.0, "{seen}");
 }
 
-/// Noise of the picture itself, where the halves tell it: in the mean of them, or in one of them, it hid more than half of itself.
+/// Noise of the picture itself, where the halves tell it: in the mean of them, or in one of them, it hid more than
+/// half of itself.
 #[test]
 fn noise_in_a_mean_of_the_halves_does_not_hide_itself() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -134,7 +136,8 @@ fn noise_in_a_mean_of_the_halves_does_not_hide_itself() {
             assert!(said.contains("it is one of the halves, or has more of one"), "{guide}: {said}");
         }
     }
-    // A reference beside a render has none of the render's noise, and clean pictures lie between halves that hardly differ.
+    // A reference beside a render has none of the render's noise, and clean pictures lie between halves that hardly
+    // differ.
     write(folder.path(), "b.exr", |_| [40.0; 3]);
     let ask = |guide: &str| {
         run(
@@ -146,8 +149,8 @@ fn noise_in_a_mean_of_the_halves_does_not_hide_itself() {
     assert_eq!(ask("b.exr"), ask("clean.exr"));
 }
 
-/// Texture loses what the operator blurs once, as noise does: lost twice, it hid little, and noise was up to 4 times as visible as on
-/// the display that shows it.
+/// Texture loses what the operator blurs once, as noise does: lost twice, it hid little, and noise was up to 4 times
+/// as visible as on the display that shows it.
 #[test]
 fn texture_behind_a_loss_of_acuity_hides_what_it_hides_on_the_display() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -199,8 +202,8 @@ fn coverage_alone_is_seen_over_white() {
     assert_eq!(code, 0, "{said}");
 }
 
-/// A frame before its figure comes covers nothing. It passed for opaque black, and `tonemap` wrote it so between frames that are not; a pass has
-/// light and no alpha, and beside it black is what it has none in.
+/// A frame before its figure comes covers nothing. It passed for opaque black, and `tonemap` wrote it so between
+/// frames that are not; a pass has light and no alpha, and beside it black is what it has none in.
 #[test]
 fn what_covers_nothing_is_transparent_and_passes_are_not() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -249,7 +252,8 @@ fn dark_detail_of_an_hdr_picture_survives_a_lit_room() {
     assert!(code == 1 && visibility(&said) > 3.0, "{said}");
 }
 
-/// The program's own PNG of a picture looks like the picture: to rods, behind a loss of acuity, on displays of any curve.
+/// The program's own PNG of a picture looks like the picture: to rods, behind a loss of acuity, on displays of any
+/// curve.
 #[test]
 fn a_picture_looks_like_its_own_png() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -307,8 +311,8 @@ fn a_render_is_seen_as_it_was_judged() {
     }
 }
 
-/// Premultiplied in the EXR file and straight in the PNG, a transparent picture is one: by operators that scale light and by those that
-/// do not, which made another picture of light times alpha (50 by ferwerda96), in sRGB and in PQ.
+/// Premultiplied in the EXR file and straight in the PNG, a transparent picture is one: by operators that scale light
+/// and by those that do not, which made another picture of light times alpha (50 by ferwerda96), in sRGB and in PQ.
 #[test]
 fn transparent_pictures_are_seen_alike() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -332,8 +336,9 @@ fn transparent_pictures_are_seen_alike() {
     }
 }
 
-/// A lamp that lets four fifths through sends more than its alpha times white: `render` cut it there where `tonemap` and `compare` kept
-/// it, and the picture's two files were told apart by 29.7 of a threshold. Edges of what is whole keep their alpha.
+/// A lamp that lets four fifths through sends more than its alpha times white: `render` cut it there where `tonemap`
+/// and `compare` kept it, and the picture's two files were told apart by 29.7 of a threshold. Edges of what is whole
+/// keep their alpha.
 #[test]
 fn lamps_that_let_light_through_are_one_picture() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -368,7 +373,8 @@ fn lamps_that_let_light_through_are_one_picture() {
     }
 }
 
-/// What a file says of its display goes before what another's curve suggests, whichever is named first: it was 0.4 and 25.
+/// What a file says of its display goes before what another's curve suggests, whichever is named first: it was 0.4
+/// and 25.
 #[test]
 fn a_display_that_is_told_goes_before_a_guess() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -386,7 +392,8 @@ fn a_display_that_is_told_goes_before_a_guess() {
     }
 }
 
-/// What alpha says is not there is no night: eyes that took it for one showed a figure in daylight flat white. By a render and by `tonemap`.
+/// What alpha says is not there is no night: eyes that took it for one showed a figure in daylight flat white. By a
+/// render and by `tonemap`.
 #[test]
 fn eyes_adapt_to_what_is_there() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -429,7 +436,8 @@ fn the_shape_of_pixels_is_kept_in_a_png() {
     }
 }
 
-/// A render's pixels are square: for a display whose own are not it drew and tagged square ones, which that display stretched.
+/// A render's pixels are square: for a display whose own are not it drew and tagged square ones, which that display
+/// stretched.
 #[test]
 fn nothing_is_rendered_for_pixels_that_are_not_square() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -464,7 +472,8 @@ fn a_render_is_seen_on_its_own_display() {
     assert!(code == 2 && said.contains("give --operator"), "{said}");
 }
 
-/// A display of one's own is kept with what was made for it: with a preset's name and another distance, with a name beyond ASCII.
+/// A display of one's own is kept with what was made for it: with a preset's name and another distance, with a name
+/// beyond ASCII.
 #[test]
 fn a_render_is_seen_on_a_display_of_ones_own() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -505,7 +514,8 @@ fn the_display_of_a_scene_is_kept() {
     assert_eq!(std::fs::read(folder.path().join("d.toml")).expect("kept"), b"white_cd_m2 = 250");
 }
 
-/// Light that only an HDR display has is seen on one, in the files that `tonemap` makes for it, and no more of it than it has.
+/// Light that only an HDR display has is seen on one, in the files that `tonemap` makes for it, and no more of it
+/// than it has.
 #[test]
 fn pictures_for_hdr_displays_are_seen_on_one() {
     let folder = tempfile::tempdir().expect("a folder");

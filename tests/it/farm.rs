@@ -151,8 +151,8 @@ fn order_repetition_and_bad_files_change_nothing() {
     assert!(picture(&farm) == whole, "the picture differs from one process's");
 }
 
-/// SIGUSR1 writes the checkpoint and goes on, SIGTERM writes it and ends, SIGKILL leaves the last: each time the next process
-/// goes on from there.
+/// SIGUSR1 writes the checkpoint and goes on, SIGTERM writes it and ends, SIGKILL leaves the last: each time the next
+/// process goes on from there.
 #[cfg(unix)]
 #[test]
 fn a_unit_goes_on_from_its_checkpoint() {
@@ -246,7 +246,8 @@ fn kept_films_are_those_of_their_frames() {
         for figure in ["scene", "seed", "seeds", "csf", "eye", "operator", "stop_reason"] {
             assert_eq!(again[figure], of_frame["report"][figure], "{figure} of frame {frame}");
         }
-        // Films do not say which small things their frames were known to have: the noise of few pixels is told otherwise.
+        // Films do not say which small things their frames were known to have: the noise of few pixels is told
+        // otherwise.
         let [told, of_frame] = [&again, &of_frame["report"]].map(|report| report["visibility_max"].as_f64());
         let ratio = told.zip(of_frame).map(|(told, of_frame)| told / of_frame).expect("two visibilities");
         assert!((ratio - 1.0).abs() < 1e-3, "visibility of frame {frame}: {ratio} times as strong");

@@ -54,7 +54,8 @@ fn a_film_that_is_lost_or_damaged_is_made_anew() {
     assert!(picture(&damaged) == whole, "the picture differs from one process's");
 }
 
-/// Squares of such light are beyond f32, and what the film keeps of them must be read again: by a farm, and by a render that goes on.
+/// Squares of such light are beyond f32, and what the film keeps of them must be read again: by a farm, and by a
+/// render that goes on.
 #[test]
 fn extreme_light_comes_to_an_end() {
     let folder = tempfile::tempdir().expect("a folder");

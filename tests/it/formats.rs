@@ -116,7 +116,8 @@ fn smoothing_groups_round_edges() {
     assert!(error.contains("bad.obj:10:"), "{error}");
 }
 
-/// Where a file ends its paths its picture is darker than ours: that is said, in scatterings whatever the format counts.
+/// Where a file ends its paths its picture is darker than ours: that is said, in scatterings whatever the format
+/// counts.
 #[test]
 fn the_depth_of_the_files_paths_is_named() {
     let pbrt = |integrator: &str| {
@@ -184,8 +185,8 @@ fn the_direction_of_anisotropy_is_read() {
     assert!((model.anisotropy.evaluate(&textures, glam::Vec2::ZERO) - 0.5).abs() < 1e-6);
 }
 
-/// A node that turns about another and a camera that drives on blur for as long as a side file holds the shutter open, and are at every
-/// moment where the animation has them.
+/// A node that turns about another and a camera that drives on blur for as long as a side file holds the shutter
+/// open, and are at every moment where the animation has them.
 #[test]
 fn rigid_nodes_of_gltf_move_while_the_shutter_is_open() {
     let folder = tempfile::tempdir().unwrap();

@@ -109,8 +109,9 @@ fn clear_dielectrics_return_everything() {
                 transmittance: ColorInput::constant(Vec3::ONE),
                 absorption: Vec3::ZERO,
             };
-            // Paths inside a rough ball are long and their weights differ: noisier than the others. At index 2.4 and roughness 0.6
-            // the error is 0.007 to 0.010 (of 400 blocks), and that of 16 blocks differs from it by a quarter.
+            // Paths inside a rough ball are long and their weights differ: noisier than the others. At index 2.4 and
+            // roughness 0.6 the error is 0.007 to 0.010 (of 400 blocks), and that of 16 blocks differs from it by a
+            // quarter.
             assert_returns_within(&surface, Vec3::ONE, 0.015);
         }
     }
@@ -152,8 +153,8 @@ fn infinite_bounces_add_up() {
     }
 }
 
-/// Light that nobody could see is left to chance, and nothing of it is lost: in a dark closed box that emits, light after two
-/// scatterings and more is 1.1 % of all, and most of it is below threshold.
+/// Light that nobody could see is left to chance, and nothing of it is lost: in a dark closed box that emits, light
+/// after two scatterings and more is 1.1 % of all, and most of it is below threshold.
 #[test]
 fn pruned_light_is_not_lost() {
     const ALBEDO: f32 = 0.1;
@@ -183,7 +184,8 @@ fn pruned_light_is_not_lost() {
     assert!(f64::from(some) < 0.95 * f64::from(all), "{some} of {all} rays");
 }
 
-/// A camera under water sees a lamp in the water through all of it, and one beyond its surface through what lies between.
+/// A camera under water sees a lamp in the water through all of it, and one beyond its surface through what lies
+/// between.
 #[test]
 fn a_camera_in_a_volume_sees_through_it() {
     let through = |lamp_at: f32| {
@@ -233,7 +235,8 @@ fn reflectance_ends_at_nothing_and_all() {
     }
 }
 
-/// Layers over a volume's boundary are there, and return no more than comes in; without them clear glass returns everything.
+/// Layers over a volume's boundary are there, and return no more than comes in; without them clear glass returns
+/// everything.
 #[test]
 fn layers_lie_over_volumes() {
     let returned = |clearcoat: f32, sheen: f32| {
@@ -275,7 +278,8 @@ fn coarse_torus() -> Mesh {
     mesh
 }
 
-/// What reflects as a mirror, in whole or in part, loses little where normals between the corners turn away from flat faces.
+/// What reflects as a mirror, in whole or in part, loses little where normals between the corners turn away from flat
+/// faces.
 #[test]
 fn silhouettes_of_smooth_meshes_lose_little() {
     let plastic = Surface::CoatedDiffuse {

@@ -1,4 +1,5 @@
-//! Attributes of glTF that do not fit their meshes: "all attribute accessors for a given primitive MUST have the same count" (2.0, 3.7.2.1).
+//! Attributes of glTF that do not fit their meshes: "all attribute accessors for a given primitive MUST have the same
+//! count" (2.0, 3.7.2.1).
 
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
@@ -184,7 +185,8 @@ fn a_texture_of_an_extension_alone_is_named_as_such() {
     assert!(scene.notes.iter().any(|note| note == expected), "{:?}", scene.notes);
 }
 
-/// Files written by hand forget to say what their materials use: a specular-glossiness material was white without a word.
+/// Files written by hand forget to say what their materials use: a specular-glossiness material was white without a
+/// word.
 #[test]
 fn extensions_of_materials_are_named_though_the_file_declares_none() {
     for declared in [json!([]), json!(["KHR_materials_dispersion"])] {

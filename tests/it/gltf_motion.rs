@@ -51,8 +51,8 @@ fn place(scene: &Scene, share: f32) -> (f32, f32) {
     (transform.translation.x, transform.matrix3.x_axis.length())
 }
 
-/// A jump inside the shutter is none before its key, and one as the shutter closes is not seen: both were smeared from an eighth of the
-/// shutter before.
+/// A jump inside the shutter is none before its key, and one as the shutter closes is not seen: both were smeared
+/// from an eighth of the shutter before.
 #[test]
 fn jumps_are_not_smeared() {
     let folder = tempfile::tempdir().unwrap();
@@ -102,7 +102,8 @@ fn what_is_hidden_in_the_shutter_blurs_until_then() {
     );
 }
 
-/// A node with morph targets moves in the shutter whatever their weights: it blurred in those frames alone whose weights were all 0.
+/// A node with morph targets moves in the shutter whatever their weights: it blurred in those frames alone whose
+/// weights were all 0.
 #[test]
 fn morphing_nodes_move_on() {
     let folder = tempfile::tempdir().unwrap();

@@ -71,8 +71,8 @@ fn a_killed_render_resumes_to_the_same_bytes() {
     assert_eq!(names(at), ["a.film", "parts.exr", "whole.exr"], "something was left behind");
 }
 
-/// Killed in the middle of a shot and called again, `animate` keeps the frames that were done and makes the others, to the bytes
-/// of a run in one go; no picture has its name before it is whole.
+/// Killed in the middle of a shot and called again, `animate` keeps the frames that were done and makes the others,
+/// to the bytes of a run in one go; no picture has its name before it is whole.
 #[test]
 fn a_killed_shot_goes_on_to_the_same_bytes() {
     let [whole, parts] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
@@ -248,8 +248,8 @@ fn films_are_merged_and_judged_again() {
     );
 }
 
-/// Samples that sight has spread were called uniform by whoever resumed so, without one more, and the word on dark surroundings was gone. Even
-/// ones may go on by any rule; and a sum of both kinds is not uniform.
+/// Samples that sight has spread were called uniform by whoever resumed so, without one more, and the word on dark
+/// surroundings was gone. Even ones may go on by any rule; and a sum of both kinds is not uniform.
 #[test]
 fn counts_are_called_by_the_rule_that_chose_them() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -134,7 +134,8 @@ fn unlike_things_are_told_apart() {
     assert!((among_black / alone - 1.0).abs() < 0.15, "{among_black} for {alone}");
 }
 
-/// Forty balls of dust in the sun, of which renders asked for 8 left out 30 ± 1 % of the light, and those asked for 1 12.5 ± 1.6 %.
+/// Forty balls of dust in the sun, of which renders asked for 8 left out 30 ± 1 % of the light, and those asked for 1
+/// 12.5 ± 1.6 %.
 #[test]
 fn dust_is_not_missed() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/scenes/dust.toml");
@@ -146,8 +147,8 @@ fn dust_is_not_missed() {
     assert!((sum / even - 1.0).abs() < 0.08, "{sum} for {even}");
 }
 
-/// A ball of light half a pixel beyond the picture's border, or a crop's, shines into it by the pixel filter: of eight renders six found nothing and
-/// called a border 77 times above threshold done.
+/// A ball of light half a pixel beyond the picture's border, or a crop's, shines into it by the pixel filter: of
+/// eight renders six found nothing and called a border 77 times above threshold done.
 #[test]
 fn light_beside_the_film_is_not_missed() {
     let pixel = 2.0 * 5.0 * 10.0_f32.to_radians().tan() / SIDE as f32;

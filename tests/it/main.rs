@@ -2,12 +2,14 @@
 //!
 //! - `support`: scenes made in code, and rendering them
 //! - `furnace`: energy: closed and open white furnaces with known answers
-//! - `direct_light`: irradiance from a rectangle, a disk, a sphere, a point and environments against closed forms; radiosity
+//! - `direct_light`: irradiance from a rectangle, a disk, a sphere, a point and environments against closed forms;
+//!   radiosity
 //! - `clear_coats`: clear coats of glTF over bumps and lamps
 //! - `coverage`: alpha: stacks, spheres, lamps that no ray meets
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
 //! - `bench`: the benchmark from end to end, small
-//! - `small_lamps`, `lit_things`: lamps and other things smaller than a pixel, and light beside the film, which the first samples may pass by
+//! - `small_lamps`, `lit_things`: lamps and other things smaller than a pixel, and light beside the film, which the
+//!   first samples may pass by
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `denoise`: denoised pictures: the raw mean beside them, equal bytes, libraries that are not there
 //! - `formats`: the same scene from several formats

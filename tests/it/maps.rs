@@ -10,7 +10,8 @@ fn render(arguments: &[&str], folder: &Path) -> Command {
     command
 }
 
-/// Where counts are even the map has one colour; at a target far above what is left all is blue, far below it nothing is.
+/// Where counts are even the map has one colour; at a target far above what is left all is blue, far below it nothing
+/// is.
 #[test]
 fn maps_show_counts_and_what_can_be_seen() {
     let folder = tempfile::tempdir().expect("a folder");

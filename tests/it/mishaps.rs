@@ -23,8 +23,8 @@ fn fechner(folder: &Path) -> Command {
 
 const RENDER: [&str; 6] = ["render", "s.toml", "--size", "16x16", "--visibility", "2"];
 
-/// Where nobody reads what it says, a render still keeps its samples and writes its picture; where nobody reads an answer any more,
-/// the exit status is what it would have been.
+/// Where nobody reads what it says, a render still keeps its samples and writes its picture; where nobody reads an
+/// answer any more, the exit status is what it would have been.
 #[test]
 #[cfg(unix)]
 fn closed_ends_cost_nothing() {
@@ -66,8 +66,8 @@ fn an_answer_that_is_lost_is_told() {
     }
 }
 
-/// A limit to the size of files is told as a full disk is: once while the render goes on, of each file at its end. What else was
-/// asked for is written, and what was found is said.
+/// A limit to the size of files is told as a full disk is: once while the render goes on, of each file at its end.
+/// What else was asked for is written, and what was found is said.
 #[test]
 #[cfg(unix)]
 fn what_cannot_be_written_keeps_nothing_else() {
@@ -116,8 +116,8 @@ fn figures_that_are_lost_take_nothing_along() {
     assert!(folder.path().join("kept.png").exists(), "{words}");
 }
 
-/// The picture of a name that no file can have was lost when all of it was rendered: the name that it has until it is complete is a shorter
-/// one. No sample is taken for it.
+/// The picture of a name that no file can have was lost when all of it was rendered: the name that it has until it is
+/// complete is a shorter one. No sample is taken for it.
 #[test]
 #[cfg(unix)]
 fn names_that_are_too_long_are_refused_beforehand() {
@@ -179,7 +179,8 @@ fn outputs_replace_no_texture() {
     }
 }
 
-/// What a command reads is still there afterwards, whatever its outputs are called, and of two outputs none replaces the other.
+/// What a command reads is still there afterwards, whatever its outputs are called, and of two outputs none replaces
+/// the other.
 #[test]
 fn outputs_replace_no_inputs() {
     let folder = folder();

@@ -49,7 +49,8 @@ fn cameras_without_an_up_stand_as_mitsubas_do() {
     assert!(up.abs_diff_eq(Vec3::new(0.82193, -0.11872, -0.55709), 1e-4), "{up}");
 }
 
-/// The view that a film of 32 × 32 has at another size: what it shows at a distance of 1, where the film's own half height is 1.
+/// The view that a film of 32 × 32 has at another size: what it shows at a distance of 1, where the film's own half
+/// height is 1.
 fn window_at(sensor: &str, [width, height]: [u32; 2]) -> ScreenWindow {
     let folder = folder();
     let path = folder.path().join("scene.xml");

@@ -217,7 +217,8 @@ fn spectra_of_mitsuba_3_are_read() {
         let found = radiance(&spectrum).unwrap();
         assert!((found / expected - 1.0).abs().max_element() < 0.003, "{spectrum}: {found} {expected}");
     }
-    // Mitsuba 3.7's scalar_spectral has -1095 for blue, which no light of ours has: it is as bright, and mixed with grey.
+    // Mitsuba 3.7's scalar_spectral has -1095 for blue, which no light of ours has: it is as bright, and mixed with
+    // grey.
     let of_rgb = |rgb: Vec3| rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722));
     let green = radiance(&between(&[("min", 500.0), ("max", 600.0)])).unwrap();
     assert!((of_rgb(green) / of_rgb(Vec3::new(3547.0, 12459.0, -1095.0)) - 1.0).abs() < 0.003, "{green}");

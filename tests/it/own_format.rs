@@ -1,4 +1,5 @@
-//! Our own format: what lamps of a luminous power emit, keys that change nothing, and files that are found from the scene's folder.
+//! Our own format: what lamps of a luminous power emit, keys that change nothing, and files that are found from the
+//! scene's folder.
 
 use fechner::scene::hash::content_hash;
 use fechner::scene::load::{LoadOptions, load};
@@ -210,7 +211,8 @@ fn a_display_file_lies_beside_its_scene() {
     assert_eq!(beside, folder.path().join("room.toml").display().to_string());
 }
 
-/// The example of `scenes/README.md`, with the files that it names, loads as it stands; so does its other kind of relief.
+/// The example of `scenes/README.md`, with the files that it names, loads as it stands; so does its other kind of
+/// relief.
 #[test]
 fn the_example_of_the_format_loads() {
     let document = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/README.md")).unwrap();

@@ -81,7 +81,8 @@ fn options_are_a_name_and_a_value() {
     assert!(wrong.contains("scene.pbrt:1: expected a value, found Film"), "{wrong}");
 }
 
-/// What is read but not rendered is told, of textures, media and lights as well: `power` made distant lights as many times as bright.
+/// What is read but not rendered is told, of textures, media and lights as well: `power` made distant lights as many
+/// times as bright.
 #[test]
 fn what_is_not_rendered_is_told() {
     let texture = r#"Texture "t" "spectrum" "constant" "float valu" 1 Material "diffuse" "texture reflectance" "t""#;
@@ -130,7 +131,8 @@ fn imports_keep_their_state_to_themselves() {
     }
 }
 
-/// Version 4 reads `TransformBegin` as `AttributeBegin`: material, light, orientation and active transforms ended with the file.
+/// Version 4 reads `TransformBegin` as `AttributeBegin`: material, light, orientation and active transforms ended
+/// with the file.
 #[test]
 fn transform_blocks_keep_their_whole_state_to_themselves() {
     for block in ["Attribute", "Transform"] {
@@ -159,7 +161,8 @@ fn files_of_version_3_are_told_what_to_do() {
     assert!(old.contains("texture \"t\" is of \"color\" of pbrt-v3: `pbrt --upgrade`"), "{old}");
 }
 
-/// The shorter side of the whole film spans [−1, 1] at every size of the picture; only what the file states is stretched.
+/// The shorter side of the whole film spans [−1, 1] at every size of the picture; only what the file states is
+/// stretched.
 #[test]
 fn pictures_of_another_size_have_square_pixels() {
     let folder = folder();
@@ -357,7 +360,8 @@ enum Facing {
     TurnedOver,
 }
 
-/// Where the front of the only shape is, in its own coordinates: spheres, disks and cylinders are made to face outwards or up.
+/// Where the front of the only shape is, in its own coordinates: spheres, disks and cylinders are made to face
+/// outwards or up.
 fn facing(scene: &Scene) -> Facing {
     let Some(instance) = scene.instances.first() else { return Facing::AsMade };
     let mesh = &scene.meshes[instance.mesh.0 as usize];
@@ -372,7 +376,8 @@ fn facing(scene: &Scene) -> Facing {
     }
 }
 
-/// pbrt's `Sphere`, `Disk` and `Cylinder::InteractionFromIntersection`; shapes that move have its `identity` for a transform.
+/// pbrt's `Sphere`, `Disk` and `Cylinder::InteractionFromIntersection`; shapes that move have its `identity` for a
+/// transform.
 #[test]
 fn mirroring_turns_quadrics_over_and_no_mesh() {
     use Facing::{AsMade, TurnedOver};

@@ -20,9 +20,9 @@ struct Case {
     /// Pixels of the reference along a side of one of ours.
     divisor: u32,
     samples: u32,
-    /// Scatterings that the reference's paths have at most: two fewer than the "maxdepth" of the file, which Tungsten's exporter
-    /// writes as one more than its own count, of which the last does not look for lights. Seen in veach-mis, where the file says
-    /// 3 and what no lamp reaches directly is exactly 0.
+    /// Scatterings that the reference's paths have at most: two fewer than the "maxdepth" of the file, which
+    /// Tungsten's exporter writes as one more than its own count, of which the last does not look for lights. Seen in
+    /// veach-mis, where the file says 3 and what no lamp reaches directly is exactly 0.
     max_depth: u32,
     /// What is known to differ between the file and its reference, undone.
     known: Option<Known>,
@@ -42,10 +42,10 @@ impl Case {
     }
 }
 
-/// Seen in the reference of veach-mis: the plates' fronts, which no lamp reaches, are exactly 0, so it was made with one
-/// scattering event; the largest lamp (7.598) mirrored in the smoothest plate is (2.166, 1.416, 1.184), 0.297 times what the
-/// file's copper reflects in each channel; and the rough plates' highlights end where Beckmann's do, not GGX's.
-/// The same scene in Mitsuba's form says "specular_reflectance" 0.3 and "beckmann".
+/// Seen in the reference of veach-mis: the plates' fronts, which no lamp reaches, are exactly 0, so it was made with
+/// one scattering event; the largest lamp (7.598) mirrored in the smoothest plate is (2.166, 1.416, 1.184), 0.297
+/// times what the file's copper reflects in each channel; and the rough plates' highlights end where Beckmann's do,
+/// not GGX's. The same scene in Mitsuba's form says "specular_reflectance" 0.3 and "beckmann".
 const VEACH_MIS: Known = Known {
     what: "metals tinted 0.3, Beckmann",
     change: |scene| {
@@ -58,9 +58,9 @@ const VEACH_MIS: Known = Known {
     },
 };
 
-/// Seen in the reference of veach-ajar: a floor of light and dark tiles where the file has one even metal. The same scene in
-/// Mitsuba's form tints that metal by a checkerboard of 0.8 and 0.2, 20 × 80 over the floor, and makes the door's handle
-/// Beckmann's.
+/// Seen in the reference of veach-ajar: a floor of light and dark tiles where the file has one even metal. The same
+/// scene in Mitsuba's form tints that metal by a checkerboard of 0.8 and 0.2, 20 × 80 over the floor, and makes the
+/// door's handle Beckmann's.
 const VEACH_AJAR: Known = Known {
     what: "floor tinted 0.8 and 0.2 in tiles",
     change: |scene| {

@@ -104,7 +104,8 @@ fn turned_normals_lose_what_lies_below_the_surface_and_no_more() {
     }
 }
 
-/// Steep random heights on a plane and a ball, seen from face on to grazing: nothing is NaN, brighter than the furnace, or black.
+/// Steep random heights on a plane and a ball, seen from face on to grazing: nothing is NaN, brighter than the
+/// furnace, or black.
 #[test]
 fn steep_heights_neither_shine_nor_go_black() {
     let noise = || {

@@ -1,4 +1,5 @@
-//! Velocity maps against rendered frames: what a frame shows is, within noise, where its map says that the next one has it.
+//! Velocity maps against rendered frames: what a frame shows is, within noise, where its map says that the next one
+//! has it.
 
 use crate::support::{add_material, add_rectangle, diffuse, empty_scene, trace_settings};
 use fechner::animate::velocity::VelocityMap;
@@ -14,8 +15,8 @@ const HEIGHT: u32 = 40;
 const ROWS: u32 = 6;
 const PATCHES_PER_ROW: u32 = 17;
 
-/// A wall of patches of as many greys. Its rows slide past each other, and the camera goes by and turns. Nothing is in the way
-/// of the light of the surroundings, so that no patch changes as it moves.
+/// A wall of patches of as many greys. Its rows slide past each other, and the camera goes by and turns. Nothing is
+/// in the way of the light of the surroundings, so that no patch changes as it moves.
 fn wall(frame: f32) -> Scene {
     let mut scene = empty_scene();
     // Brighter to one side, so that its light has noise.
@@ -51,7 +52,8 @@ fn film_of(tracer: &PathTracer) -> Film {
     film
 }
 
-/// Whether all of a pixel's neighbours show the same patch, so that what is beside it in the next frame is that patch too.
+/// Whether all of a pixel's neighbours show the same patch, so that what is beside it in the next frame is that patch
+/// too.
 fn is_inside(film: &Film, x: u32, y: u32) -> bool {
     let albedo = |x: u32, y: u32| film.features()[(y * WIDTH + x) as usize].albedo[0];
     let own = albedo(x, y);
@@ -88,8 +90,8 @@ fn squared_scores(film: &Film, next: &Estimate, motion: &[Vec2]) -> Vec<f64> {
     inside.filter_map(score).collect()
 }
 
-/// Where both frames see a point they agree within their own variance; without the map, or with the one to the frame before,
-/// they do not.
+/// Where both frames see a point they agree within their own variance; without the map, or with the one to the frame
+/// before, they do not.
 #[test]
 fn a_frame_is_where_its_velocity_says_in_the_next_one() {
     let [before, now, next] = [-1.0, 0.0, 1.0].map(wall);
@@ -99,7 +101,8 @@ fn a_frame_is_where_its_velocity_says_in_the_next_one() {
     let mean = |scores: &[f64]| scores.iter().sum::<f64>() / scores.len() as f64;
     let warped = squared_scores(&film, &next, &map.to_next);
     assert!(warped.len() > 200 && warped.iter().all(|score| score.is_finite()), "{} pixels", warped.len());
-    // Stratified samples vary less than their variance says; four standard errors of a mean square of 1 are added to it.
+    // Stratified samples vary less than their variance says; four standard errors of a mean square of 1 are added to
+    // it.
     let most = 1.0 + 4.0 * (2.0 / warped.len() as f64).sqrt();
     let worst = warped.iter().copied().fold(0.0, f64::max);
     assert!(mean(&warped) < most && worst < 36.0, "{} in the mean, {worst} at most", mean(&warped));

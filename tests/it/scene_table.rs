@@ -1,4 +1,5 @@
-//! Every scene of others, small: triangles, seconds to load, seconds to visibilities 4 and 1 (the table in scenes/README.md).
+//! Every scene of others, small: triangles, seconds to load, seconds to visibilities 4 and 1 (the table in
+//! scenes/README.md).
 
 use crate::load_assets::assets;
 use crate::support::{loop_settings, trace_settings};
@@ -69,7 +70,8 @@ fn row(path: &Path, name: &str) {
     println!("| {name} | {triangles} | {loaded:.2} | {} | {} |", shown(at_4), shown(at_1));
 }
 
-/// `cargo test --release -p fechner --test it scene_table -- --ignored --nocapture` (part of a scene's path in FECHNER_SCENE)
+/// `cargo test --release -p fechner --test it scene_table -- --ignored --nocapture` (part of a scene's path in
+/// FECHNER_SCENE)
 #[test]
 #[ignore = "minutes of rendering"]
 fn seconds_to_load_and_to_see_nothing() {

@@ -44,8 +44,8 @@ fn found(tracer: &PathTracer) -> Vec<f32> {
     film.estimate(1.0).luminance_cd_m2.values().to_vec()
 }
 
-/// A ball of a fifth of a pixel, one on a corner of four pixels, and a needle of a twentieth, by each filter: what is looked for in a pixel is
-/// what its samples find, of which 8192 leave four per cent to chance.
+/// A ball of a fifth of a pixel, one on a corner of four pixels, and a needle of a twentieth, by each filter: what is
+/// looked for in a pixel is what its samples find, of which 8192 leave four per cent to chance.
 #[test]
 fn shares_are_what_samples_find() {
     let ball = |scene: &mut Scene| add_sphere(scene, Vec3::new(0.05, 0.04, 0.0), 0.012, LAMP);
@@ -70,8 +70,8 @@ fn shares_are_what_samples_find() {
     }
 }
 
-/// A sun of a twelfth of a pixel: looked for where samples find it, through a lens too, but not behind a wall, nor where nothing shows what is
-/// behind things.
+/// A sun of a twelfth of a pixel: looked for where samples find it, through a lens too, but not behind a wall, nor
+/// where nothing shows what is behind things.
 #[test]
 fn the_sun_is_looked_for() {
     let sun = |scene: &mut Scene, aperture_radius: f32| {
@@ -136,7 +136,8 @@ fn blur(scene: &mut Scene, blur_px: f32) {
     scene.camera.aperture_radius = blur_px * pixel / (1.0 / 2.5 - 1.0 / 5.0);
 }
 
-/// A ball and two triangles far out of focus, and a ball that half of the lens sees: they are looked for where samples find them, and as much.
+/// A ball and two triangles far out of focus, and a ball that half of the lens sees: they are looked for where
+/// samples find them, and as much.
 #[test]
 fn shares_of_blurred_lamps_are_what_samples_find() {
     let ball = |scene: &mut Scene| add_sphere(scene, Vec3::new(0.05, 0.04, 0.0), 0.05, LAMP);
@@ -167,8 +168,8 @@ fn shares_of_blurred_lamps_are_what_samples_find() {
     }
 }
 
-/// A ball that passes by and one with a lens as well, a turning needle, a tile before a camera that pans and one that half of its way hides: they
-/// are looked for where samples find them, and as much.
+/// A ball that passes by and one with a lens as well, a turning needle, a tile before a camera that pans and one that
+/// half of its way hides: they are looked for where samples find them, and as much.
 #[test]
 fn shares_of_lamps_that_pass_by_are_what_samples_find() {
     let to = |way: Vec3| Motion::between(Affine3A::IDENTITY, Affine3A::from_translation(way));
@@ -209,7 +210,8 @@ fn shares_of_lamps_that_pass_by_are_what_samples_find() {
     }
 }
 
-/// What a lens blurs over the whole picture and far beyond comes to an end, and what a film is a part of has the shares of the whole.
+/// What a lens blurs over the whole picture and far beyond comes to an end, and what a film is a part of has the
+/// shares of the whole.
 #[test]
 fn blurred_lamps_are_looked_for_within_the_film() {
     let scene = |blur_px: f32, depth: f32, radius: f32| {
@@ -232,8 +234,8 @@ fn blurred_lamps_are_looked_for_within_the_film() {
     assert!(expected.iter().all(|&share| share > 0.0));
 }
 
-/// Forty balls far out of focus, and before a camera that pans, of which renders asked for 8 saw a few and left out 46 ± 3 and 27 ± 1 % of their
-/// light.
+/// Forty balls far out of focus, and before a camera that pans, of which renders asked for 8 saw a few and left out
+/// 46 ± 3 and 27 ± 1 % of their light.
 #[test]
 fn blurred_lamps_are_not_missed() {
     for name in ["out-of-focus", "streaks"] {
@@ -290,7 +292,8 @@ fn stars_are_not_missed() {
     assert!((sum / even - 1.0).abs() < 0.1, "{sum} for {even}");
 }
 
-/// A tube that goes on far beyond the picture, and one in numbers so large that neighbours are a pixel apart, have their samples as others do.
+/// A tube that goes on far beyond the picture, and one in numbers so large that neighbours are a pixel apart, have
+/// their samples as others do.
 #[test]
 fn long_and_far_lamps_come_to_an_end() {
     let long = |scene: &mut Scene| {
@@ -310,7 +313,8 @@ fn long_and_far_lamps_come_to_an_end() {
     assert!(shares_of(&tracer).is_none_or(|shares| shares.iter().all(|share| share.is_finite())));
 }
 
-/// What is left of a budget after the samples for stars goes everywhere: given to pixels that had met none, it made them 13 % too bright.
+/// What is left of a budget after the samples for stars goes everywhere: given to pixels that had met none, it made
+/// them 13 % too bright.
 #[test]
 fn the_rest_of_a_budget_is_no_matter_of_luck() {
     let mut scene = empty_scene();

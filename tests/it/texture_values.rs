@@ -75,7 +75,8 @@ fn colours_of_other_primaries_are_brought_to_rec_709() {
     assert_eq!((seen(&plain).0, notes(&plain, "p.exr")), (Vec3::new(0.3, 0.5, 0.2), 0));
 }
 
-/// Green of Rec.2020 is 0.678 of white. With its negative channels it was light that is taken away, with them cut off 19 % too bright.
+/// Green of Rec.2020 is 0.678 of white. With its negative channels it was light that is taken away, with them cut off
+/// 19 % too bright.
 #[test]
 fn colours_outside_rec_709_are_light_of_their_own_luminance() {
     let green = scene(&even(&[("R", 0.0), ("G", 1.0), ("B", 0.0)]), Some(REC2020));
@@ -163,8 +164,8 @@ fn a_picture_without_blue_has_none() {
     assert_eq!(seen(&scene(&even(&[("R", 0.1)]), None)).0, Vec3::splat(0.1));
 }
 
-/// The colours of an EXR file are multiplied by its alpha, those of a PNG file are not. As a card, whose alpha says where it is, both are
-/// what is there; as a colour alone they are as they stand.
+/// The colours of an EXR file are multiplied by its alpha, those of a PNG file are not. As a card, whose alpha says
+/// where it is, both are what is there; as a colour alone they are as they stand.
 #[test]
 fn the_colours_of_a_card_are_not_multiplied_by_alpha_twice() {
     let folder = tempfile::tempdir().unwrap();
@@ -208,8 +209,8 @@ fn environment(bytes: &[u8]) -> Result<Scene, String> {
     load(&path, &LoadOptions::default()).map_err(|error| error.to_string())
 }
 
-/// Radiance writes CIE XYZ as well, in its own primaries' white of equal energy, and rows in any order. What is not read is said to be
-/// not read, not to be damaged.
+/// Radiance writes CIE XYZ as well, in its own primaries' white of equal energy, and rows in any order. What is not
+/// read is said to be not read, not to be damaged.
 #[test]
 fn radiance_pictures_of_other_kinds_are_told_apart() {
     let grey = [[128, 128, 128, 128], [64, 64, 64, 128]];

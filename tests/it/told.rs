@@ -129,7 +129,8 @@ fn one_is_told_as_one() {
     }
 }
 
-/// What tells nothing of noise is not taken for its absence: halves of one seed, one sample, a denoised crop of one pixel.
+/// What tells nothing of noise is not taken for its absence: halves of one seed, one sample, a denoised crop of one
+/// pixel.
 #[test]
 fn what_tells_nothing_of_noise_is_said() {
     let folder = tempfile::tempdir().expect("a folder");

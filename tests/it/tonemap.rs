@@ -115,8 +115,8 @@ fn light_that_covers_nothing_is_kept() {
     assert!(flame[3].abs_diff(159) <= 1 && flame[1] == 255, "{flame:?}");
 }
 
-/// An alpha multiplies the display's black too: what is not covered holds none, and the file shows what its PNG does. On a display whose
-/// black is not dark it was 133 codes off, with a note about flames that are not there.
+/// An alpha multiplies the display's black too: what is not covered holds none, and the file shows what its PNG does.
+/// On a display whose black is not dark it was 133 codes off, with a note about flames that are not there.
 #[test]
 fn a_transparent_exr_is_shown_as_its_png() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -315,8 +315,8 @@ fn exposure_changes_the_picture_and_takes_no_samples() {
     }
 }
 
-/// A camera that was moved starts anew, and its TOML in the scene file is the same camera; a broken scene file says where
-/// and leaves the picture.
+/// A camera that was moved starts anew, and its TOML in the scene file is the same camera; a broken scene file says
+/// where and leaves the picture.
 #[test]
 fn the_camera_moves_and_the_scene_file_is_watched() {
     let folder = tempfile::tempdir().expect("a folder");

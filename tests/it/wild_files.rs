@@ -89,7 +89,8 @@ fn picture(format: image::ImageFormat) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// A kind of picture that is not read costs the picture and not the scene; a damaged one names the line that asks for it.
+/// A kind of picture that is not read costs the picture and not the scene; a damaged one names the line that asks for
+/// it.
 #[test]
 fn pictures_of_every_kind_leave_a_scene() {
     let with = |name: &str, bytes: &[u8]| {
@@ -174,7 +175,8 @@ fn vertices_that_no_face_uses_may_be_anything() {
     assert!(read(&[("p.ply", ply.replace("LAST", "2").as_bytes())]).unwrap_err().contains("vertex 2"));
 }
 
-/// A triangle in glTF. `MORE` stands for further keys of the primitive, `TOP` for those of the file, `ATTRIBUTES` for further attributes.
+/// A triangle in glTF. `MORE` stands for further keys of the primitive, `TOP` for those of the file, `ATTRIBUTES` for
+/// further attributes.
 const TRIANGLE: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],TOP
 "meshes":[{"name":"piece","primitives":[{"attributes":{"POSITION":0ATTRIBUTES}MORE}]}],
 "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},

@@ -103,7 +103,8 @@ fn checks(x: f64, y: f64) -> f64 {
     if (across.cos() >= 0.0) == (along.cos() >= 0.0) { 1.0 } else { -1.0 }
 }
 
-/// J₀ by its integral, (1/π) ∫ cos(z sin t) dt over half a turn: for a periodic integrand the midpoint rule is exact to rounding.
+/// J₀ by its integral, (1/π) ∫ cos(z sin t) dt over half a turn: for a periodic integrand the midpoint rule is exact
+/// to rounding.
 fn bessel_j0(z: f64) -> f64 {
     const STEPS: u32 = 128;
     let at = |step: u32| (z * ((f64::from(step) + 0.5) * std::f64::consts::PI / f64::from(STEPS)).sin()).cos();

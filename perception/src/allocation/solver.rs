@@ -139,9 +139,9 @@ impl<'a> Solver<'a> {
 
     /// Multipliers that would be right if every pixel were alone: n = w / b, so μ = c w / b², with b the bound of v².
     ///
-    /// The relaxed bound, not what is wanted: where counts stand at `max_samples` noise is 1 / 1.01 of it, so that updates
-    /// lower a multiplier by 3 % only, and one that began too high stays so (half of a picture out of reach by 60 times: gap
-    /// 3.0 after 100 updates).
+    /// The relaxed bound, not what is wanted: where counts stand at `max_samples` noise is 1 / 1.01 of it, so that
+    /// updates lower a multiplier by 3 % only, and one that began too high stays so (half of a picture out of reach
+    /// by 60 times: gap 3.0 after 100 updates).
     pub(super) fn first_multipliers(&self, visibility: f64) -> Vec<f32> {
         let (bounds, _) = self.bounds(visibility);
         let alone: Vec<f32> = self
@@ -348,9 +348,9 @@ impl<'a> Solver<'a> {
         })
     }
 
-    /// A block is constrained at those of its pixels that tolerate least: with them the others are within their limits, since
-    /// pooling hardly varies over a block. Measured on a chequerboard of 0.3 and 1, constrained by the mean of each
-    /// block's tolerances instead: 8.5 % too dear, with a certified gap of 430 %.
+    /// A block is constrained at those of its pixels that tolerate least: with them the others are within their
+    /// limits, since pooling hardly varies over a block. Measured on a chequerboard of 0.3 and 1, constrained by the
+    /// mean of each block's tolerances instead: 8.5 % too dear, with a certified gap of 430 %.
     fn shares_by(&self, tolerance: &[f32]) -> Vec<f32> {
         const AS_TIGHT: f32 = 1.001;
         let mut shares = vec![0.0; tolerance.len()];

@@ -125,14 +125,15 @@ fn a_conic_solver_finds_the_same_cost() {
     }
 }
 
-/// Over x = 1/n and t ≥ 1/x: minimise c·t subject to A x ≤ 1, 1/most ≤ x ≤ 1/least and t x ≥ 1, which is the second-order
-/// cone |(2, t − x)| ≤ t + x.
+/// Over x = 1/n and t ≥ 1/x: minimise c·t subject to A x ≤ 1, 1/most ≤ x ≤ 1/least and t x ≥ 1, which is the
+/// second-order cone |(2, t − x)| ≤ t + x.
 fn conic_optimum(case: &Case, scale: &Plane, least: f64, most: f64) -> f64 {
     use clarabel::algebra::CscMatrix;
     use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
     let (width, height) = (case.cost.width(), case.cost.height());
     let count = width * height;
-    // Variables: x times `scale`, then t over it: unscaled, t x = 1e3 · 1e-3 is lost in the cone, and so is the optimum.
+    // Variables: x times `scale`, then t over it: unscaled, t x = 1e3 · 1e-3 is lost in the cone, and so is the
+    // optimum.
     let scale: Vec<f64> = scale.values().iter().map(|count| f64::from(*count)).collect();
     let (mut rows, mut columns, mut values, mut bounds) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut entry = |row: usize, column: usize, value: f64| {

@@ -8,7 +8,8 @@ use super::{ContrastSensitivity, HIGHEST_CPD};
 /// Barten, "The square root integral (SQRI)", 1989, in the form that perceptualdiff and OpenImageIO use: a u exp(−b u)
 /// √(1 + 0.06 exp(b u)) with a = 440 (1 + 0.7/L)^−0.2 and b = 0.3 (1 + 100/L)^0.15.
 ///
-/// Knows no area and is 2 to 3 times above thresholds measured for 1°: for ratios and for comparison with those programs.
+/// Knows no area and is 2 to 3 times above thresholds measured for 1°: for ratios and for comparison with those
+/// programs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Barten89;
 

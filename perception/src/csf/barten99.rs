@@ -5,11 +5,11 @@
 
 use super::ContrastSensitivity;
 
-/// Barten, "Contrast sensitivity of the human eye and its effects on image quality", SPIE Press, 1999: foveal and static, from
-/// the eye's optics, photon noise, neural noise and lateral inhibition.
+/// Barten, "Contrast sensitivity of the human eye and its effects on image quality", SPIE Press, 1999: foveal and
+/// static, from the eye's optics, photon noise, neural noise and lateral inhibition.
 ///
-/// k = 3, T = 0.1 s, `X_max` = 12°, `N_max` = 15 cycles, η = 0.03, Φ₀ = 3e-8 s deg², u₀ = 7 cpd, σ₀ = 0.5′, `C_ab` = 0.08′/mm,
-/// p = 1.2274e6 (white of a CRT).
+/// k = 3, T = 0.1 s, `X_max` = 12°, `N_max` = 15 cycles, η = 0.03, Φ₀ = 3e-8 s deg², u₀ = 7 cpd, σ₀ = 0.5′, `C_ab` =
+/// 0.08′/mm, p = 1.2274e6 (white of a CRT).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Barten99 {
     /// Side of the square field, degrees.

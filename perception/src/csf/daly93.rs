@@ -7,8 +7,9 @@ use super::ContrastSensitivity;
 
 /// Daly, "The visible differences predictor: an algorithm for the assessment of image fidelity", 1993.
 ///
-/// With the original constants (P = 250, ε = 0.9, ob = 0.78), fovea, orientation in radians, and an image area i² of 1 deg² unless
-/// set: the code in circulation that goes with castleCSF has refitted constants and passes degrees to the cosine.
+/// With the original constants (P = 250, ε = 0.9, ob = 0.78), fovea, orientation in radians, and an image area i² of
+/// 1 deg² unless set: the code in circulation that goes with castleCSF has refitted constants and passes degrees to
+/// the cosine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Daly93 {
     /// Area of the image, i² in the formula, deg².

@@ -12,7 +12,8 @@ use crate::table::Between;
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
-/// Seconds before and after a moment whose frames it is seen with: the sustained channel's response has fallen to 1 % by then.
+/// Seconds before and after a moment whose frames it is seen with: the sustained channel's response has fallen to 1 %
+/// by then.
 const REACH_S: f64 = 0.2;
 
 /// Looks at a display in a second, at the least: a step of light is seen most some 20 ms before and after it, and
@@ -23,15 +24,16 @@ const LOOKS_PER_SECOND: f64 = 120.0;
 /// Weights of frames around the one that is shown, from [`FrameResponses::reach`] frames earlier to as many later.
 pub(crate) type Weights = Vec<f32>;
 
-/// castleCSF's temporal channels (Ashraf et al. 2024) as weights of frames, at several moments while one of them is shown.
+/// castleCSF's temporal channels (Ashraf et al. 2024) as weights of frames, at several moments while one of them is
+/// shown.
 ///
-/// A channel with the temporal response R(f), taken without phase, leaves h(k, t) = T ∫ R(f) sinc(f T p) cos(2π f (k T − t)) df
-/// of a frame k frames away, t after the middle of the one that is shown (T the time of a frame, p the share of it for which it
-/// is lit). Without a scale of its own: over all moments fresh noise has the energy of [`super::FreshNoise`], and the same light
-/// is seen alike at any frame rate.
+/// A channel with the temporal response R(f), taken without phase, leaves h(k, t) = T ∫ R(f) sinc(f T p) cos(2π f (k
+/// T − t)) df of a frame k frames away, t after the middle of the one that is shown (T the time of a frame, p the
+/// share of it for which it is lit). Without a scale of its own: over all moments fresh noise has the energy of
+/// [`super::FreshNoise`], and the same light is seen alike at any frame rate.
 ///
-/// What stands still is seen as in a still: the sustained channels' weights add up to 1, and the transient one's to 0. The flicker
-/// that a display of short flashes adds to all that it shows is left out.
+/// What stands still is seen as in a still: the sustained channels' weights add up to 1, and the transient one's to
+/// 0. The flicker that a display of short flashes adds to all that it shows is left out.
 #[derive(Clone, Debug)]
 pub(crate) struct FrameResponses {
     reach: usize,
@@ -123,8 +125,8 @@ fn most_held(looks: &[Look]) -> Weights {
     most.into_iter().map(|weight| weight / sum).collect()
 }
 
-/// Weights of the frames that are there, which take those of the others: what they add to light that stands still, and to light that changes
-/// from frame to frame and back.
+/// Weights of the frames that are there, which take those of the others: what they add to light that stands still,
+/// and to light that changes from frame to frame and back.
 fn shared(weights: &[f32], there: &RangeInclusive<usize>) -> Weights {
     let alternating = |frame: usize| if frame.is_multiple_of(2) { 1.0 } else { -1.0 };
     let missing = || weights.iter().enumerate().filter(|(frame, _)| !there.contains(frame));
@@ -183,16 +185,17 @@ impl Moment {
         self.waves.iter().map(|wave| wave.iter().zip(&densities).map(|(wave, density)| wave * density).sum()).collect()
     }
 
-    /// Weights in a sustained channel of frames that are held. They add up to 1: what the window's ends cut off is slow, and is spread
-    /// evenly over all frames.
+    /// Weights in a sustained channel of frames that are held. They add up to 1: what the window's ends cut off is
+    /// slow, and is spread evenly over all frames.
     fn held(&self, response: impl Fn(f64) -> f64) -> Vec<f64> {
         let weights = self.weights(response, 1.0);
         let cut_off = (1.0 - weights.iter().sum::<f64>()) / weights.len() as f64;
         weights.iter().map(|weight| weight + cut_off).collect()
     }
 
-    /// Weights in a channel that leaves `still` of what stands still. Nothing is scaled, since what is there may be near 0: what the
-    /// window's ends cut off is spread evenly, and what a display's flashes add to a still is taken from frames as the eye holds them.
+    /// Weights in a channel that leaves `still` of what stands still. Nothing is scaled, since what is there may be
+    /// near 0: what the window's ends cut off is spread evenly, and what a display's flashes add to a still is taken
+    /// from frames as the eye holds them.
     fn with_sum(&self, response: impl Fn(f64) -> f64 + Copy, still: f64, held: &[f64]) -> Weights {
         let weights = self.weights(response, self.timing.persistence);
         let sum_if_held = self.weights(response, 1.0).iter().sum::<f64>();
@@ -251,7 +254,8 @@ mod tests {
         (0..look.sustained[0].len()).map(|frame| look.transient(frame, Level::of(luminance_cd_m2))).collect()
     }
 
-    /// Over all looks, the weights' energy for noise that is new in every frame is what the integrals over all frequencies say.
+    /// Over all looks, the weights' energy for noise that is new in every frame is what the integrals over all
+    /// frequencies say.
     #[test]
     fn fresh_noise_keeps_its_energy() {
         for frames_per_second in [6.0, 24.0, 30.0, 60.0, 120.0] {
@@ -344,7 +348,8 @@ mod tests {
                 let ratio = at_end / within;
                 let is_alike = match frames_a_period {
                     2.0 => (ratio - 1.0).abs() < 0.01,
-                    // Of flicker at 40 and 30 Hz, at 120 frames a second, nearly nothing is seen within and little at an end.
+                    // Of flicker at 40 and 30 Hz, at 120 frames a second, nearly nothing is seen within and little at
+                    // an end.
                     3.0 | 4.0 if frames_per_second == 120.0 => at_end < 0.35,
                     _ => (0.72..1.2).contains(&ratio),
                 };

@@ -1,7 +1,7 @@
 //! castleCSF for noise that is new in every frame of a moving picture.
 //!
-//! Such noise is flicker of all temporal frequencies at once, of which the eye integrates a part: it may be stronger than
-//! noise that stands still. Not for pictures that somebody may pause, nor for error that travels with things.
+//! Such noise is flicker of all temporal frequencies at once, of which the eye integrates a part: it may be stronger
+//! than noise that stands still. Not for pictures that somebody may pause, nor for error that travels with things.
 
 use super::castle::CastleCsf;
 use super::castle_chromatic::ChromaticChannel;
@@ -13,10 +13,11 @@ use crate::error::Error;
 
 /// Sensitivity to the spatial frequencies of noise that is independent from frame to frame.
 ///
-/// A pattern of one spatial frequency whose amplitude is drawn anew in each frame, and held for a share of it, has the
-/// temporal power density 2T sinc²(f T p) per Hz (T the time of a frame, p the share, sinc(x) = sin πx / πx). Weighted with
-/// castleCSF's temporal sensitivity ([`super::CastleTemporal`], squared) it gives the energy that the eye receives; its root
-/// is the sensitivity here, so that S of this function stands for S of still noise in every formula.
+/// A pattern of one spatial frequency whose amplitude is drawn anew in each frame, and held for a share of it, has
+/// the temporal power density 2T sinc²(f T p) per Hz (T the time of a frame, p the share, sinc(x) = sin πx / πx).
+/// Weighted with castleCSF's temporal sensitivity ([`super::CastleTemporal`], squared) it gives the energy that the
+/// eye receives; its root is the sensitivity here, so that S of this function stands for S of still noise in every
+/// formula.
 ///
 /// Spatial frequency and time separate within both channels, so three integrals over time for each luminance suffice.
 #[derive(Clone, Debug)]
@@ -88,8 +89,8 @@ impl ContrastSensitivity for FreshNoise {
 }
 
 impl FrameTiming {
-    /// Share of the energy of fresh noise in a chromatic channel that the eye receives, against noise that stands still:
-    /// castleCSF's chromatic channels (Ashraf et al. 2024) are sustained ones alone.
+    /// Share of the energy of fresh noise in a chromatic channel that the eye receives, against noise that stands
+    /// still: castleCSF's chromatic channels (Ashraf et al. 2024) are sustained ones alone.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for an impossible timing.
@@ -136,8 +137,8 @@ mod tests {
         (still.sensitivity(freq_cpd, luminance_cd_m2) / fresh.sensitivity(freq_cpd, luminance_cd_m2)).powi(2)
     }
 
-    /// Against integrals in steps of 0.01 Hz up to 400 Hz (`benches/peers/fresh_noise.py`), fine patterns first, where the transient
-    /// channel sees nothing.
+    /// Against integrals in steps of 0.01 Hz up to 400 Hz (`benches/peers/fresh_noise.py`), fine patterns first,
+    /// where the transient channel sees nothing.
     #[test]
     fn integrals_agree_with_fine_quadrature() {
         for (fps, sustained, red_green, yellow_violet) in
@@ -162,8 +163,8 @@ mod tests {
             assert!(gains.windows(2).all(|pair| pair[0] < pair[1]), "{freq_cpd} cpd: {gains:?}");
             assert!(gain(1.0, freq_cpd, 100.0) < 1.3, "{freq_cpd}: {}", gain(1.0, freq_cpd, 100.0));
         }
-        // Coarse flicker is seen by the transient channel: it gains less than fine noise, and at 24 frames a second it is seen
-        // better than a still.
+        // Coarse flicker is seen by the transient channel: it gains less than fine noise, and at 24 frames a second
+        // it is seen better than a still.
         assert!(gain(24.0, 0.3, 100.0) < 1.0 && gain(60.0, 0.3, 100.0) < gain(60.0, 8.0, 100.0));
     }
 

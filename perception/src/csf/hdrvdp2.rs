@@ -5,10 +5,10 @@
 
 use super::ContrastSensitivity;
 
-/// Mantiuk, Kim, Rempel and Heidrich, "HDR-VDP-2: a calibrated visual metric for visibility and quality predictions in all
-/// luminance conditions", 2011: neural sensitivity, the eye's optics and the sensitivity of rods and cones together, with the
-/// constants of its release 2.2 (`csf_params`, `csf_lums`, `csf_sa` and `mtf_params_a` and `_b` of `hdrvdp_parse_options.m`). It has no
-/// absolute scale (31 at best at 20 cd/m²) and knows no area.
+/// Mantiuk, Kim, Rempel and Heidrich, "HDR-VDP-2: a calibrated visual metric for visibility and quality predictions
+/// in all luminance conditions", 2011: neural sensitivity, the eye's optics and the sensitivity of rods and cones
+/// together, with the constants of its release 2.2 (`csf_params`, `csf_lums`, `csf_sa` and `mtf_params_a` and `_b` of
+/// `hdrvdp_parse_options.m`). It has no absolute scale (31 at best at 20 cd/m²) and knows no area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HdrVdp2 {
     /// Factor on the published function, which has no absolute scale.
@@ -25,7 +25,8 @@ impl Default for HdrVdp2 {
 
 /// `csf_lums`.
 const LUMINANCES_CD_M2: [f64; 6] = [0.002, 0.02, 0.2, 2.0, 20.0, 150.0];
-/// p₁ to p₄, the last four columns of `csf_params`, at each of those luminances; between them straight in log luminance.
+/// p₁ to p₄, the last four columns of `csf_params`, at each of those luminances; between them straight in log
+/// luminance.
 const PARAMETERS: [[f64; 4]; 6] = [
     [0.991_265, 3.740_38, 0.507_22, 4.460_44],
     [0.800_889, 3.541_04, 0.682_505, 4.949_58],
@@ -64,7 +65,8 @@ fn parameters(luminance_cd_m2: f64) -> [f64; 4] {
     [at(0), at(1), at(2), at(3)]
 }
 
-/// Modulation transfer of the eye's media: a sum of four exponentials, `mtf_params_a` their weights and `mtf_params_b` their decays.
+/// Modulation transfer of the eye's media: a sum of four exponentials, `mtf_params_a` their weights and
+/// `mtf_params_b` their decays.
 fn optics(freq_cpd: f64) -> f64 {
     const SHARP: f64 = 0.997_273_700_237_770_7;
     const MIDDLE: f64 = 0.061_466_549_455_263;

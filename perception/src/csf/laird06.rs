@@ -6,10 +6,12 @@
 use super::ContrastSensitivity;
 use super::daly98::{Spatiovelocity, floored};
 
-/// Laird, Rosen, Pelz, Montag and Daly, "Spatio-velocity CSF as a function of retinal velocity using unstabilized stimuli", 2006:
-/// [`super::Daly98`] with constants (0.6329, 0.8404, 0.7986) for gratings the eye is free to follow, and one more factor c₁.
+/// Laird, Rosen, Pelz, Montag and Daly, "Spatio-velocity CSF as a function of retinal velocity using unstabilized
+/// stimuli", 2006: [`super::Daly98`] with constants (0.6329, 0.8404, 0.7986) for gratings the eye is free to follow,
+/// and one more factor c₁.
 ///
-/// About half as sensitive as Daly's. Constants from the code of FovVideoVDP. Ignores luminance, which was about 100 cd/m².
+/// About half as sensitive as Daly's. Constants from the code of FovVideoVDP. Ignores luminance, which was about 100
+/// cd/m².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Laird06 {
     /// Velocity over the retina, deg/s.

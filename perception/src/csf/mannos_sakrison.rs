@@ -5,11 +5,11 @@
 
 use super::{ContrastSensitivity, HIGHEST_CPD};
 
-/// Mannos and Sakrison, "The effects of a visual fidelity criterion on the encoding of images", IEEE Trans. IT 20, 1974:
-/// 2.6 (0.0192 + 0.114 f) exp(−(0.114 f)^1.1), times a gain.
+/// Mannos and Sakrison, "The effects of a visual fidelity criterion on the encoding of images", IEEE Trans. IT 20,
+/// 1974: 2.6 (0.0192 + 0.114 f) exp(−(0.114 f)^1.1), times a gain.
 ///
-/// It knows no luminance and no absolute scale; here its peak (0.981 at 7.894 cpd) is scaled by `gain`. For teaching and
-/// comparison.
+/// It knows no luminance and no absolute scale; here its peak (0.981 at 7.894 cpd) is scaled by `gain`. For teaching
+/// and comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MannosSakrison {
     /// Factor on the published function, which is at most 0.981.

@@ -54,8 +54,8 @@ pub trait ContrastSensitivity: Send + Sync {
     /// domain is moved to its edge.
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64;
 
-    /// Share of a grating's amplitude that gets to the eye, where something before it takes detail away, as an operator's loss of acuity
-    /// does; it is in [`sensitivity`](Self::sensitivity) already.
+    /// Share of a grating's amplitude that gets to the eye, where something before it takes detail away, as an
+    /// operator's loss of acuity does; it is in [`sensitivity`](Self::sensitivity) already.
     fn transfer(&self, _freq_cpd: f64) -> f64 {
         1.0
     }
@@ -68,7 +68,8 @@ pub trait ContrastSensitivity: Send + Sync {
     }
 }
 
-/// Far above what any function sees; products of higher frequencies would not stay finite, as logarithms of no sensitivity must.
+/// Far above what any function sees; products of higher frequencies would not stay finite, as logarithms of no
+/// sensitivity must.
 const HIGHEST_CPD: f64 = 1e9;
 
 impl ContrastSensitivity for Box<dyn ContrastSensitivity> {
@@ -95,13 +96,15 @@ pub struct FrameTiming {
 }
 
 impl FrameTiming {
-    /// The timing nearest to these that responses are defined for: shorter flashes and faster displays look no otherwise.
+    /// The timing nearest to these that responses are defined for: shorter flashes and faster displays look no
+    /// otherwise.
     #[must_use]
     pub fn nearest(frames_per_second: f64, persistence: f64) -> Self {
         Self { frames_per_second: frames_per_second.clamp(1.0, 1e3), persistence: persistence.clamp(1e-3, 1.0) }
     }
 
-    /// What holding a frame for its share of the time leaves of the amplitude of a flicker: sinc(f T p), sinc(x) = sin πx / πx.
+    /// What holding a frame for its share of the time leaves of the amplitude of a flicker: sinc(f T p), sinc(x) =
+    /// sin πx / πx.
     fn held(self, flicker_hz: f64) -> f64 {
         let phase = PI * flicker_hz * (1.0 / self.frames_per_second) * self.persistence;
         if phase.abs() < 1e-9 { 1.0 } else { phase.sin() / phase }

@@ -1,7 +1,7 @@
 //! Fresh noise before an eye that moves: each frame is smeared over the retina while it is held.
 //!
-//! Not for an eye at rest, to which this is [`super::FreshNoise`], nor for displays that flash: there is no smear where frames are
-//! lit for an instant.
+//! Not for an eye at rest, to which this is [`super::FreshNoise`], nor for displays that flash: there is no smear
+//! where frames are lit for an instant.
 
 use super::castle::CastleCsf;
 use super::castle_temporal::{Energies, sustained_response, transient, transient_response};
@@ -13,10 +13,10 @@ use std::f64::consts::FRAC_PI_2;
 
 /// How much less of noise that is new in every frame an eye sees that follows something.
 ///
-/// A grating of ρ cycles a degree that is held for T p (T the time of a frame, p the share for which it is lit) passes an eye
-/// of velocity v at s = ρ v cos θ Hz, θ being the angle between the two. Drawn anew in each frame, it has the power density
-/// T sinc²((f − s) T p) on the retina: that of [`super::FreshNoise`], moved by s. Weighted with castleCSF's temporal sensitivity,
-/// squared, and averaged over θ it is what is left of the energy of white noise.
+/// A grating of ρ cycles a degree that is held for T p (T the time of a frame, p the share for which it is lit)
+/// passes an eye of velocity v at s = ρ v cos θ Hz, θ being the angle between the two. Drawn anew in each frame, it
+/// has the power density T sinc²((f − s) T p) on the retina: that of [`super::FreshNoise`], moved by s. Weighted with
+/// castleCSF's temporal sensitivity, squared, and averaged over θ it is what is left of the energy of white noise.
 #[derive(Clone, Debug)]
 pub(crate) struct PursuedNoise {
     csf: CastleCsf,
@@ -58,7 +58,8 @@ impl PursuedNoise {
         Ok(Self { csf: CastleCsf::new(area_deg2)?, luminance_cd_m2, by_shift, step_hz })
     }
 
-    /// Energy that an eye of `velocity_deg_s` receives of noise of one spatial frequency, over that which it receives at rest.
+    /// Energy that an eye of `velocity_deg_s` receives of noise of one spatial frequency, over that which it receives
+    /// at rest.
     pub(crate) fn energy_left(&self, freq_cpd: f64, velocity_deg_s: f64) -> f64 {
         let channels = [
             self.csf.sensitivity(freq_cpd, self.luminance_cd_m2),
@@ -107,7 +108,8 @@ mod tests {
         assert!((noise(60.0, 1.0).energy_left(8.0, 1e-3) - 1.0).abs() < 1e-4);
     }
 
-    /// Where the eye integrates over many frames, what is left is the smear's own share: the mean of sinc² over directions.
+    /// Where the eye integrates over many frames, what is left is the smear's own share: the mean of sinc² over
+    /// directions.
     #[test]
     fn fast_frames_are_smeared_as_a_shutter_would() {
         let (freq_cpd, velocity_deg_s) = (8.0, 20.0);
@@ -119,7 +121,8 @@ mod tests {
         assert!((left / smear - 1.0).abs() < 0.1, "{left} {smear}");
     }
 
-    /// Of the sustained channel alone, against sums in steps of 0.01 Hz up to 400 Hz and over 200 directions (`benches/peers/fresh_noise.py`).
+    /// Of the sustained channel alone, against sums in steps of 0.01 Hz up to 400 Hz and over 200 directions
+    /// (`benches/peers/fresh_noise.py`).
     #[test]
     fn energies_agree_with_fine_quadrature() {
         for (fps, freq_cpd, velocity_deg_s, expected) in [

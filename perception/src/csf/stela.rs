@@ -5,10 +5,12 @@
 use super::ContrastSensitivity;
 use super::castle::{Summation, Sustained};
 
-/// Mantiuk, Ashraf and Chapiro, "stelaCSF: a unified model of contrast sensitivity as the function of spatio-temporal frequency,
-/// eccentricity, luminance and area", 2022: the achromatic predecessor of [`super::CastleCsf`], sustained channel, foveal and static.
+/// Mantiuk, Ashraf and Chapiro, "stelaCSF: a unified model of contrast sensitivity as the function of spatio-temporal
+/// frequency, eccentricity, luminance and area", 2022: the achromatic predecessor of [`super::CastleCsf`], sustained
+/// channel, foveal and static.
 ///
-/// Constants as published to six digits; the truncation below the peak, "about 0" there, is 0 here, which is good to 2e-5.
+/// Constants as published to six digits; the truncation below the peak, "about 0" there, is 0 here, which is good to
+/// 2e-5.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StelaCsf {
     /// Area of the grating, deg².

@@ -9,8 +9,8 @@ use crate::threshold::ThresholdMap;
 /// The least share that is worth the transforms.
 const MIN_SHARE: f32 = 0.01;
 
-/// The share of the raw mean that leaves the least squared error, if the two errors are independent: that of the denoised
-/// picture over both, as far as its bias is proven and greater than the raw noise.
+/// The share of the raw mean that leaves the least squared error, if the two errors are independent: that of the
+/// denoised picture over both, as far as its bias is proven and greater than the raw noise.
 pub(super) fn raw_share(evidence: &BandEvidence, found: &BandBias) -> Plane {
     let denoised = evidence.variance.combined(&found.energy, |variance, bias| variance + bias);
     let share = denoised.combined(
@@ -49,12 +49,13 @@ impl BandError {
     }
 }
 
-/// How far a denoised picture is to be moved towards its raw mean, by [`DenoisedError::raw_shares`], display cd/m². `residual`: of
-/// one channel, denoised less raw mean as displayed, as in [`DenoisedDifferences::residual`](super::DenoisedDifferences::residual).
-/// `None` where nothing is worth moving, or the planes do not fit.
+/// How far a denoised picture is to be moved towards its raw mean, by [`DenoisedError::raw_shares`], display cd/m².
+/// `residual`: of one channel, denoised less raw mean as displayed, as in
+/// [`DenoisedDifferences::residual`](super::DenoisedDifferences::residual). `None` where nothing is worth moving, or
+/// the planes do not fit.
 ///
-/// Scene light must not be given: bands of a lamp's edge that is a thousand times as bright as the display's white ring far into
-/// what is seen beside it. What is shown ends at the display's range, to which the residual is held.
+/// Scene light must not be given: bands of a lamp's edge that is a thousand times as bright as the display's white
+/// ring far into what is seen beside it. What is shown ends at the display's range, to which the residual is held.
 #[must_use]
 pub fn step_towards_raw(map: &ThresholdMap, error: &DenoisedError, residual: &Plane) -> Option<Plane> {
     let is_worth_it = |share: &Plane| share.values().iter().any(|&share| share > MIN_SHARE);

@@ -1,17 +1,21 @@
-//! What can be seen of the error of a denoised picture: what noise is left in it, and what the denoiser made up or wiped out.
+//! What can be seen of the error of a denoised picture: what noise is left in it, and what the denoiser made up or
+//! wiped out.
 //!
-//! A path tracer's samples stand in two independent halves A and B. The picture d is the denoised mean M = (A + B)/2; the
-//! halves are also denoised by themselves, to dA and dB. Through the eye's filters and thresholds, band by band:
+//! A path tracer's samples stand in two independent halves A and B. The picture d is the denoised mean M = (A + B)/2;
+//! the halves are also denoised by themselves, to dA and dB. Through the eye's filters and thresholds, band by band:
 //!
-//! * **Variance**: energy of the half difference (dA − dB)/2, as for raw pictures. Error that both halves share is not in it.
-//! * **Bias**: the raw mean is noisy and without bias, so it bears witness. With r = d − M and the same of the halves,
-//!   rA = dA − A and rB = dB − B, the energy of r less that of (rA − rB)/2, which is what noise puts into r, is the bias's
-//!   alone on average. For a linear denoiser it is rA · rB: a product of two independent looks, so that noise averages
-//!   out. It is pooled, compared with its own standard error, and taken at its word where it stands out.
+//! * **Variance**: energy of the half difference (dA − dB)/2, as for raw pictures. Error that both halves share is
+//!   not in it.
+//! * **Bias**: the raw mean is noisy and without bias, so it bears witness. With r = d − M and the same of the
+//!   halves, rA = dA − A and rB = dB − B, the energy of r less that of (rA − rB)/2, which is what noise puts into r,
+//!   is the bias's alone on average. For a linear denoiser it is rA · rB: a product of two independent looks, so that
+//!   noise averages out. It is pooled, compared with its own standard error, and taken at its word where it stands
+//!   out.
 //! * **Factor**: elsewhere the witness is too noisy to tell a place's bias, but all places together tell how much bias
 //!   comes with how much variance: one factor a band, found by regression and drawn towards what was measured before.
 //!
-//! Visibility is both together. Where the witness would not have noticed a bias that can be seen, the picture is *unproven*.
+//! Visibility is both together. Where the witness would not have noticed a bias that can be seen, the picture is
+//! *unproven*.
 //!
 //! Not for pictures whose raw halves are not at hand, and not for denoisers that use other frames.
 
@@ -41,8 +45,8 @@ pub struct DenoisedDifferences<'a> {
     pub residual_half_difference: &'a Plane,
 }
 
-/// What can be seen of a denoised picture's error once it is moved towards its raw mean by `raw_shares`. Visibilities are pooled and in
-/// threshold units, as everywhere.
+/// What can be seen of a denoised picture's error once it is moved towards its raw mean by `raw_shares`. Visibilities
+/// are pooled and in threshold units, as everywhere.
 #[derive(Clone, Debug)]
 pub struct DenoisedError {
     /// Visibility v of variance and bias together: √(variance² + bias²).
@@ -56,8 +60,8 @@ pub struct DenoisedError {
     pub bias_squared_standard_error: Plane,
     /// Squared bias over squared variance visibility that the whole picture shows, by band, lowest first.
     pub bias_factors: Vec<f64>,
-    /// How far each band is worth moving towards the raw mean, 0 to 1, by band: the share of the denoised error in the sum of
-    /// its and the raw mean's squared errors, where a bias is proven; 0 elsewhere.
+    /// How far each band is worth moving towards the raw mean, 0 to 1, by band: the share of the denoised error in
+    /// the sum of its and the raw mean's squared errors, where a bias is proven; 0 elsewhere.
     pub raw_shares: Vec<Plane>,
 }
 
@@ -89,8 +93,8 @@ impl DenoisedError {
         }
     }
 
-    /// This error with another channel's beside it: the channel that shows most counts at every pixel. Factors and shares stay this
-    /// one's; what the other's becomes by a blend for this one is not looked at.
+    /// This error with another channel's beside it: the channel that shows most counts at every pixel. Factors and
+    /// shares stay this one's; what the other's becomes by a blend for this one is not looked at.
     ///
     /// # Panics
     /// Where the two are of pictures of two sizes.
@@ -104,8 +108,9 @@ impl DenoisedError {
         self
     }
 
-    /// This error's noise with the bias that `other` thresholds say there is: of frames, whose noise is new in each and whose bias stays.
-    /// Factors and shares stay this one's: within a band shares hardly depend on how well it is seen.
+    /// This error's noise with the bias that `other` thresholds say there is: of frames, whose noise is new in each
+    /// and whose bias stays. Factors and shares stay this one's: within a band shares hardly depend on how well it is
+    /// seen.
     ///
     /// # Panics
     /// Where the two are of pictures of two sizes.
@@ -117,8 +122,8 @@ impl DenoisedError {
         self
     }
 
-    /// This error with light beside it that no sample has found, of which so much is seen: it is missing in the raw mean too, so no blend
-    /// brings it back.
+    /// This error with light beside it that no sample has found, of which so much is seen: it is missing in the raw
+    /// mean too, so no blend brings it back.
     ///
     /// # Panics
     /// Where `missed` has another size.
@@ -130,8 +135,8 @@ impl DenoisedError {
         self
     }
 
-    /// This error with no less noise than that of such a visibility: where a picture is so small that its halves' difference has hardly a
-    /// frequency by which it could be seen.
+    /// This error with no less noise than that of such a visibility: where a picture is so small that its halves'
+    /// difference has hardly a frequency by which it could be seen.
     ///
     /// # Panics
     /// Where `noise` has another size.
@@ -143,7 +148,8 @@ impl DenoisedError {
         self
     }
 
-    /// This error for eyes whose thresholds are multiplied by a map of the same size, as where some places matter more than others.
+    /// This error for eyes whose thresholds are multiplied by a map of the same size, as where some places matter
+    /// more than others.
     ///
     /// # Panics
     /// Where `factors` has another size.
@@ -161,8 +167,9 @@ impl DenoisedError {
         self
     }
 
-    /// Multiplies visibility by `factor` where it is inferred: where even an error [`VISIBLY_WRONG`] times as visible would not be
-    /// noticed by the place's own witness. For what is learned elsewhere of errors that nothing at hand shows.
+    /// Multiplies visibility by `factor` where it is inferred: where even an error [`VISIBLY_WRONG`] times as visible
+    /// would not be noticed by the place's own witness. For what is learned elsewhere of errors that nothing at hand
+    /// shows.
     pub fn raise_inferred(&mut self, factor: f64) {
         let standard_error = &self.bias_squared_standard_error;
         self.visibility = self.visibility.combined(standard_error, |visibility, standard_error| {
@@ -185,8 +192,8 @@ impl DenoisedError {
 }
 
 impl ThresholdMap {
-    /// Judges a denoised picture that [`step_towards_raw`] moves. Planes of another size give infinity everywhere, and no factors;
-    /// pixels of which one is not finite are infinitely visible and count as 0 for the others.
+    /// Judges a denoised picture that [`step_towards_raw`] moves. Planes of another size give infinity everywhere,
+    /// and no factors; pixels of which one is not finite are infinitely visible and count as 0 for the others.
     #[must_use]
     pub fn denoised_error(&self, differences: &DenoisedDifferences<'_>) -> DenoisedError {
         self.denoised_error_after(Blending::Proven, differences)

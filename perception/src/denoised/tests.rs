@@ -79,8 +79,9 @@ fn energy(visibility: &Plane) -> f64 {
     visibility.map(|v| v * v).mean()
 }
 
-/// Blotches that the denoiser leaves are as visible as the law says, whatever their size. A picture holds about a dozen of 3°:
-/// each pair of halves is shown twice, once with one half's mistakes reversed, so that chance likeness of the two cancels.
+/// Blotches that the denoiser leaves are as visible as the law says, whatever their size. A picture holds about a
+/// dozen of 3°: each pair of halves is shown twice, once with one half's mistakes reversed, so that chance likeness
+/// of the two cancels.
 #[test]
 fn blotches_of_one_and_of_three_degrees_are_as_visible_as_predicted() {
     let map = map_of(&grey());
@@ -289,7 +290,8 @@ fn missed_light_adds_to_the_bias() {
     }
 }
 
-/// Chromatic noise that is gone in the next frame is less visible, by the energy that castleCSF's temporal channels leave; bias stays.
+/// Chromatic noise that is gone in the next frame is less visible, by the energy that castleCSF's temporal channels
+/// leave; bias stays.
 #[test]
 fn chromatic_noise_of_a_moving_picture_is_less_visible() {
     let viewing = Viewing::of(Display::preset("strict").unwrap());

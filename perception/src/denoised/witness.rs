@@ -12,13 +12,13 @@ use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
 const USUAL_FACTOR: f64 = 0.2;
 /// Standard deviation of the factor between pictures.
 const FACTOR_DEVIATION: f64 = 0.4;
-/// Standard errors above what the factor says from which a place's own witness begins to count, and from which it counts alone.
-/// Far out, since products of two normal values have long tails. Measured at 3 and 5: raw noise of visibility 20 alone
-/// is taken for a bias of 1.8.
+/// Standard errors above what the factor says from which a place's own witness begins to count, and from which it
+/// counts alone. Far out, since products of two normal values have long tails. Measured at 3 and 5: raw noise of
+/// visibility 20 alone is taken for a bias of 1.8.
 const BELIEVED_FROM: f32 = 5.0;
 const BELIEVED_FULLY: f32 = 8.0;
-/// Half the width of the window over which a band is pooled, in its own periods: a narrower one holds so few independent
-/// values that neither noise nor witness means much. At least the eye's window.
+/// Half the width of the window over which a band is pooled, in its own periods: a narrower one holds so few
+/// independent values that neither noise nor witness means much. At least the eye's window.
 const WINDOW_CYCLES: f64 = 0.5;
 /// Fourth over squared second moment of a normal variable.
 const NORMAL_KURTOSIS: f32 = 3.0;
@@ -66,8 +66,8 @@ impl BandEvidence {
         // ∫ g² of the window is 1 over this area.
         let window_deg2 = 4.0 * std::f64::consts::PI * sigma_deg * sigma_deg;
         let correlated = (correlation_area_px(map, filters, band) / pixels_a_deg2 / window_deg2).min(1.0) as f32;
-        // rA · rB of two normal halves, each of twice the mean's variance s², has the variance 4 s⁴. The fourth power of
-        // the half difference keeps rare, large noise where it is, so that a firefly calls itself uncertain.
+        // rA · rB of two normal halves, each of twice the mean's variance s², has the variance 4 s⁴. The fourth power
+        // of the half difference keeps rare, large noise where it is, so that a firefly calls itself uncertain.
         let fourth = map.blurred(&noise.map(|energy| energy * energy), sigma_deg / std::f64::consts::SQRT_2);
         let pooled = |energy: &Plane| map.blurred(energy, sigma_deg);
         let mut witness_variance = fourth.map(|fourth| 4.0 / NORMAL_KURTOSIS * correlated * fourth);
@@ -82,13 +82,13 @@ impl BandEvidence {
     }
 }
 
-/// Multiplies the variance of pooled values by what mirrored borders repeat in the window: half as many independent values make twice the
-/// variance at an edge, four times at a corner.
+/// Multiplies the variance of pooled values by what mirrored borders repeat in the window: half as many independent
+/// values make twice the variance at an edge, four times at a corner.
 ///
-/// Along one axis the window g, at distance d from a mirror, weighs what is inside with g(u − d) + g(u + d), u > 0. The square's
-/// integral is that of g(u − d)² over the whole axis and of 2 g(u − d) g(u + d) over half of it: ∫ g² · (1 + exp(−d²/σ²)) for a
-/// Gaussian. Measured on raw noise of visibility 4.0 alone, pixels where it is taken for a bias above 1: without this
-/// 0.42 % at edges and 2.0 % at corners, with it 0.12 and 0.32 %.
+/// Along one axis the window g, at distance d from a mirror, weighs what is inside with g(u − d) + g(u + d), u > 0.
+/// The square's integral is that of g(u − d)² over the whole axis and of 2 g(u − d) g(u + d) over half of it: ∫ g² ·
+/// (1 + exp(−d²/σ²)) for a Gaussian. Measured on raw noise of visibility 4.0 alone, pixels where it is taken for a
+/// bias above 1: without this 0.42 % at edges and 2.0 % at corners, with it 0.12 and 0.32 %.
 fn repeat_at_borders(variance: &mut Plane, sigma_x_px: f64, sigma_y_px: f64) {
     let repetition = |index: usize, len: usize, sigma_px: f64| {
         let by_border = |pixels_between: usize| 1.0 + (-((pixels_between as f64 + 0.5) / sigma_px).powi(2)).exp();
@@ -164,8 +164,8 @@ mod tests {
     use crate::test_noise::normal;
     use crate::threshold::{ThresholdInputs, threshold_map};
 
-    /// The witness of noise without bias scatters as much as it says, at borders and corners too, where the window holds the
-    /// same values twice or four times.
+    /// The witness of noise without bias scatters as much as it says, at borders and corners too, where the window
+    /// holds the same values twice or four times.
     #[test]
     fn the_witness_knows_its_noise_at_borders() {
         const SIDE: usize = 64;

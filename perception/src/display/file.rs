@@ -83,9 +83,9 @@ fn wrong(reason: impl Into<String>) -> Error {
 impl Display {
     /// Reads a display file: a TOML table whose keys are the fields of [`Display`], all optional.
     ///
-    /// `preset` names the display that fills what is left out (`desktop` if absent). A file without a `name` is called as its
-    /// preset, "desktop, changed" where it differs from that, and "file" without one. Instead of `pixels_per_degree`
-    /// a file may give `width_px`, `width_m` and `distance_m`.
+    /// `preset` names the display that fills what is left out (`desktop` if absent). A file without a `name` is
+    /// called as its preset, "desktop, changed" where it differs from that, and "file" without one. Instead of
+    /// `pixels_per_degree` a file may give `width_px`, `width_m` and `distance_m`.
     ///
     /// ```
     /// use fechner_perception::Display;

@@ -10,7 +10,8 @@ use glam::Vec4;
 const LUMINANCE_SIGMAS: f32 = 3.0;
 /// A neighbour this many times farther off than the surface's slope explains gets 1/e of the weight.
 pub const DEPTH_SLOPES: f32 = 1.5;
-/// A neighbour that differs by this share of the pixel's own luminance or depth gets 1/e of the weight where there is neither noise nor slope.
+/// A neighbour that differs by this share of the pixel's own luminance or depth gets 1/e of the weight where there is
+/// neither noise nor slope.
 const OWN_SHARE: f32 = 1e-3;
 /// Keeps what is divided by from being 0 where there is neither light nor depth.
 const NOTHING: f32 = 1e-12;
@@ -33,8 +34,8 @@ fn falling(x: Vec4) -> Vec4 {
     fourth * fourth
 }
 
-/// One pass over a 3×3 kernel whose taps lie `hole` pixels apart, at most [`BORDER`]. All taps of a few columns at once, so that
-/// sums stay in vector registers: tap by tap along whole rows it takes three times the instructions.
+/// One pass over a 3×3 kernel whose taps lie `hole` pixels apart, at most [`BORDER`]. All taps of a few columns at
+/// once, so that sums stay in vector registers: tap by tap along whole rows it takes three times the instructions.
 pub(super) fn filter_pass(
     light: &Rows<LIGHT_CHANNELS>,
     surfaces: &Rows<SURFACE_CHANNELS>,

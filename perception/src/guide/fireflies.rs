@@ -8,8 +8,8 @@ use std::ops::Range;
 /// Fewer neighbours say nothing of a pixel.
 const MIN_NEIGHBORS: f32 = 3.0;
 
-/// Brings pixels down to four standard deviations above the mean of those of their kind in the 5×5 pixels around, themselves
-/// left out.
+/// Brings pixels down to four standard deviations above the mean of those of their kind in the 5×5 pixels around,
+/// themselves left out.
 pub(super) fn tame_fireflies(light: &mut Rows<LIGHT_CHANNELS>, surfaces: &Rows<SURFACE_CHANNELS>) {
     const RADIUS: usize = 2;
     let (width, height) = (light.width, light.height);
@@ -41,7 +41,8 @@ pub(super) fn tame_fireflies(light: &mut Rows<LIGHT_CHANNELS>, surfaces: &Rows<S
     });
 }
 
-/// What is known of the luminances around each pixel of a row: sums that lie apart, so that they are made on vector registers.
+/// What is known of the luminances around each pixel of a row: sums that lie apart, so that they are made on vector
+/// registers.
 struct Neighbors {
     counts: Vec<f32>,
     sums: Vec<f32>,

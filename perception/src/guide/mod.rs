@@ -21,7 +21,8 @@ pub use surfaces::{BEYOND, FARTHEST_SURFACE, depth_slopes};
 /// A noisy picture and what is known of its surfaces. All slices are row-major with `width * height` entries.
 #[derive(Clone, Copy, Debug)]
 pub struct GuideInputs<'a> {
-    /// Mean of the samples, linear RGB in cd/m², or another unit in which light lies between 1e-5 and 1e9; the result has the same.
+    /// Mean of the samples, linear RGB in cd/m², or another unit in which light lies between 1e-5 and 1e9; the result
+    /// has the same.
     pub rgb: &'a [[f32; 3]],
     /// Variance of the mean's luminance, in the square of that unit.
     pub variance: &'a Plane,
@@ -57,8 +58,8 @@ const VARIANCE: usize = 4;
 /// filter (Dammertz et al., "Edge-avoiding À-Trous wavelet transform for fast global illumination filtering", 2010)
 /// whose luminance weights follow the filtered variance (Schied et al., "Spatiotemporal variance-guided filtering",
 /// 2017), over a 3×3 kernel. Before that, pixels far above everything around them are brought down: a firefly is no
-/// light. What is too dark to be divided by its albedo is in another unit than what is not, and the two are no neighbours. The
-/// cost is linear in the number of pixels.
+/// light. What is too dark to be divided by its albedo is in another unit than what is not, and the two are no
+/// neighbours. The cost is linear in the number of pixels.
 ///
 /// Slices of the wrong length give the picture back as it came. Values that are not finite count as 0.
 #[must_use]
@@ -92,8 +93,8 @@ pub fn denoise(inputs: &GuideInputs<'_>) -> Vec<[f32; 3]> {
     denoised
 }
 
-/// What a pixel is divided by to leave its illumination: its albedo, 0.02 at the least in each channel; 1 where that is darker by
-/// luminance, or not finite.
+/// What a pixel is divided by to leave its illumination: its albedo, 0.02 at the least in each channel; 1 where that
+/// is darker by luminance, or not finite.
 #[must_use]
 pub fn divisor(albedo: [f32; 3]) -> [f32; 3] {
     if is_divided(albedo) { albedo.map(|channel| channel.max(MIN_ALBEDO)) } else { [1.0; 3] }

@@ -20,8 +20,8 @@ pub(super) const NORMAL_Y: usize = 1;
 pub(super) const NORMAL_Z: usize = 2;
 pub(super) const DEPTH: usize = 3;
 pub(super) const SLOPE: usize = 4;
-/// A number for each kind of pixel: a surface whose light is divided by its albedo, one whose light is not, and emptiness, likewise.
-/// Those of one kind alone are neighbours.
+/// A number for each kind of pixel: a surface whose light is divided by its albedo, one whose light is not, and
+/// emptiness, likewise. Those of one kind alone are neighbours.
 pub(super) const KIND: usize = 5;
 
 /// What is known of each pixel's surface, with values that need no checks: an infinite depth is [`NO_DEPTH`], a broken
@@ -46,8 +46,8 @@ pub(super) fn surfaces(inputs: &GuideInputs<'_>) -> Rows<SURFACE_CHANNELS> {
     surfaces
 }
 
-/// How much depth, row-major in rows of `width`, changes from a pixel to the next, taken on the flatter side so that silhouettes do not
-/// count: finite, 0 where nothing tells.
+/// How much depth, row-major in rows of `width`, changes from a pixel to the next, taken on the flatter side so that
+/// silhouettes do not count: finite, 0 where nothing tells.
 #[must_use]
 pub fn depth_slopes(depth: &[f32], width: usize) -> Vec<f32> {
     let width = width.max(1);

@@ -175,7 +175,8 @@ fn a_pixel_without_albedo_keeps_its_light() {
     }
 }
 
-/// Nothing beside the picture is taken for a neighbour, where nothing is hit least of all; in the second tile of a row, too.
+/// Nothing beside the picture is taken for a neighbour, where nothing is hit least of all; in the second tile of a
+/// row, too.
 #[test]
 fn an_even_sky_stays_even() {
     let (width, height) = (70, 5);

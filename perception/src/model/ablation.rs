@@ -27,8 +27,8 @@ impl ThresholdModel for Unmasked {
 
 /// Masking without contrast sensitivity: threshold versus intensity, raised as texture raises the default's thresholds.
 ///
-/// The curve is lowered by 0.95 log units to where contrast sensitivity puts it, so that resolution and fine noise are what
-/// is left out, and not a factor that any search would take back.
+/// The curve is lowered by 0.95 log units to where contrast sensitivity puts it, so that resolution and fine noise
+/// are what is left out, and not a factor that any search would take back.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaskedTvi;
 

@@ -10,12 +10,12 @@ use crate::filter::{gaussian_blur, reflect};
 use crate::masking::threshold_elevation;
 use crate::plane::Plane;
 
-/// After "A perceptually based adaptive sampling algorithm", SIGGRAPH 1998: the picture in Haar bands, each with its own
-/// contrast sensitivity and masked by its own contrast; samples go where the error of a band could be seen.
+/// After "A perceptually based adaptive sampling algorithm", SIGGRAPH 1998: the picture in Haar bands, each with its
+/// own contrast sensitivity and masked by its own contrast; samples go where the error of a band could be seen.
 ///
-/// The paper's text was not at hand; this keeps its frame (Haar bands, per-band sensitivity, masking by what the band holds)
-/// and judges the band energy of white pixel noise, of which level i of a Haar transform holds 3/4^i, by this crate's
-/// definition of visibility. Its bounds are our standard errors; its colour channels are left to
+/// The paper's text was not at hand; this keeps its frame (Haar bands, per-band sensitivity, masking by what the band
+/// holds) and judges the band energy of white pixel noise, of which level i of a Haar transform holds 3/4^i, by this
+/// crate's definition of visibility. Its bounds are our standard errors; its colour channels are left to
 /// [`crate::threshold::chromatic_threshold_map`]. Unlike [`super::CsfBands`] it trusts the guide's contrast as it
 /// stands: no noise is taken out and no edge is kept from masking what lies beside it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

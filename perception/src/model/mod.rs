@@ -37,8 +37,8 @@ pub struct ModelInputs<'a> {
     pub display_luminance_cd_m2: &'a Plane,
     /// What is known of the noise in the guide, variances in (cd/m²)².
     pub guide_noise: GuideNoise<&'a Plane>,
-    /// Speed over the picture, deg/s, of what each pixel shows (see [`crate::motion::image_velocity_deg_s`]); `None` for a
-    /// still. Only for error that travels with the object.
+    /// Speed over the picture, deg/s, of what each pixel shows (see [`crate::motion::image_velocity_deg_s`]); `None`
+    /// for a still. Only for error that travels with the object.
     pub image_velocity_deg_s: Option<&'a Plane>,
     /// How much each pixel attracts the gaze, 0..1 (see [`crate::saliency`]); `None` is 1: everything is followed.
     pub attention: Option<&'a Plane>,
@@ -87,7 +87,8 @@ pub trait ThresholdModel: Send + Sync {
     /// [`Error`] for planes of different sizes, values that are not finite or negative, and impossible viewings.
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error>;
 
-    /// Whether [`ModelInputs::csf`] changes what it allows: not of models of intensity alone, nor of those with a function of their own.
+    /// Whether [`ModelInputs::csf`] changes what it allows: not of models of intensity alone, nor of those with a
+    /// function of their own.
     fn knows_csf(&self) -> bool {
         true
     }
@@ -97,14 +98,15 @@ pub trait ThresholdModel: Send + Sync {
         false
     }
 
-    /// Visibility of the noise in half of the difference of two independent pictures, cd/m² on the display: 1 where noise of
-    /// what the model allows is expected to be.
+    /// Visibility of the noise in half of the difference of two independent pictures, cd/m² on the display: 1 where
+    /// noise of what the model allows is expected to be.
     ///
-    /// A model that knows only pixels gets the noise's energy pooled over a Gaussian of σ 0.25°, as the default's is; one that knows
-    /// bands measures in them.
+    /// A model that knows only pixels gets the noise's energy pooled over a Gaussian of σ 0.25°, as the default's is;
+    /// one that knows bands measures in them.
     ///
     /// # Errors
-    /// As for [`ThresholdModel::allowed_standard_error_cd_m2`], and [`Error::SizeMismatch`] for a difference of another size.
+    /// As for [`ThresholdModel::allowed_standard_error_cd_m2`], and [`Error::SizeMismatch`] for a difference of
+    /// another size.
     fn measured_visibility(&self, inputs: &ModelInputs<'_>, half_difference: &Plane) -> Result<Plane, Error> {
         let allowed = self.allowed_standard_error_cd_m2(inputs)?;
         half_difference.check_size("half difference", allowed.width(), allowed.height())?;
@@ -128,11 +130,12 @@ fn pooled(energy: &Plane, viewing: &Viewing) -> Plane {
     gaussian_blur_xy(energy, viewing.display.pixel_density().pixels(POOLING_SIGMA_DEG))
 }
 
-/// Two-sided 95 % of a normal distribution, its quantile of 0.975 (1.959 96) as tables round it: models that stop on a confidence
-/// interval ask z σ ≤ T.
+/// Two-sided 95 % of a normal distribution, its quantile of 0.975 (1.959 96) as tables round it: models that stop on
+/// a confidence interval ask z σ ≤ T.
 const Z_95: f64 = 1.96;
 
-/// Name of the model that is meant where none is named, and the only one that knows denoised pictures and where one looks.
+/// Name of the model that is meant where none is named, and the only one that knows denoised pictures and where one
+/// looks.
 pub const DEFAULT: &str = "csf-bands";
 
 /// Makes a model with its defaults.
@@ -327,7 +330,8 @@ mod tests {
         assert!((coarse_to_fine("tvi") - 1.0).abs() < 0.01);
     }
 
-    /// White noise of what a model allows is at threshold by it; what moves hides noise from the models that know motion.
+    /// White noise of what a model allows is at threshold by it; what moves hides noise from the models that know
+    /// motion.
     #[test]
     fn noise_is_measured_by_the_models_own_thresholds() {
         let (grey, moving) = (Plane::filled(160, 96, 50.0), Plane::filled(160, 96, 20.0));

@@ -11,14 +11,14 @@ use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 
 /// Contrast bands of the published models.
 pub(crate) const BANDS: usize = 6;
-/// Contrast of all bands together below which there is none: what the kernel's rounding leaves of a uniform picture is 20 times less,
-/// the least that eyes see 100 times more.
+/// Contrast of all bands together below which there is none: what the kernel's rounding leaves of a uniform picture
+/// is 20 times less, the least that eyes see 100 times more.
 const MIN_CONTRAST: f32 = 1e-5;
 /// Below this luminance, cd/m², a band's contrast is taken over it instead.
 const MIN_LUMINANCE_CD_M2: f32 = 1e-4;
 
-/// Local band contrasts `C_i` = |`G_i` − `G_i+1`| / `G_i+2` (Lubin, Peli) of Gaussian levels `G_0` = picture, `G_i+1` = `G_i` through
-/// the kernel (0.05, 0.25, 0.4, 0.25, 0.05) with holes of 2^i pixels.
+/// Local band contrasts `C_i` = |`G_i` − `G_i+1`| / `G_i+2` (Lubin, Peli) of Gaussian levels `G_0` = picture, `G_i+1`
+/// = `G_i` through the kernel (0.05, 0.25, 0.4, 0.25, 0.05) with holes of 2^i pixels.
 ///
 /// The holes matter: the same small kernel applied again and again, as public implementations do, gives no octaves.
 pub(crate) fn band_contrasts(picture: &Plane) -> Vec<Plane> {
@@ -50,9 +50,9 @@ pub(crate) fn band_frequency_cpd(band: usize, pixels_per_degree: f64) -> f64 {
         }
 }
 
-/// Threshold map of the models that weigh each band's elevation by its share of the local contrast: the `base` threshold at each
-/// pixel's adaptation luminance times `factor(Σ C_i f_i / Σ C_i)`, where `elevation_at(x, y, adaptation, band, C_i)` is f_i. A picture
-/// without contrast has no weights: nothing is elevated.
+/// Threshold map of the models that weigh each band's elevation by its share of the local contrast: the `base`
+/// threshold at each pixel's adaptation luminance times `factor(Σ C_i f_i / Σ C_i)`, where `elevation_at(x, y,
+/// adaptation, band, C_i)` is f_i. A picture without contrast has no weights: nothing is elevated.
 pub(crate) fn contrast_weighted(
     inputs: &ModelInputs<'_>,
     base: ThresholdBase<'_>,

@@ -12,15 +12,15 @@ use crate::masking::threshold_elevation;
 use crate::plane::Plane;
 use crate::tvi::ThresholdBase;
 
-/// "A perceptually based physical error metric for realistic image synthesis", SIGGRAPH 1999: T = TVI(`L_a`) · F, where
-/// F = Σ (`C_i`/ΣC) · (`S_max`/S(`ρ_i`)) · mask(`C_i` S(`ρ_i`)) raises the threshold where the picture's contrast lies off the peak of
-/// contrast sensitivity and where it masks; a pixel stops at 1.96 σ ≤ T.
+/// "A perceptually based physical error metric for realistic image synthesis", SIGGRAPH 1999: T = TVI(`L_a`) · F,
+/// where F = Σ (`C_i`/ΣC) · (`S_max`/S(`ρ_i`)) · mask(`C_i` S(`ρ_i`)) raises the threshold where the picture's
+/// contrast lies off the peak of contrast sensitivity and where it masks; a pixel stops at 1.96 σ ≤ T.
 ///
-/// Changed: the base is `L_a` over the CSF's peak instead of the TVI curve unless `raw_tvi` is set (TVI says 5.6 % where
-/// gratings are seen at 0.7 %, and F multiplies that), F is kept within 1 and 10 (else a textured pixel may err by 79 % of its
-/// background), the bands carry their measured frequencies, and the CSF is the one given, at the pixel's own adaptation for
-/// masking and at 100 cd/m² for F's frequency part. Contrast-weighted, F leaks from an edge into the flat beside it;
-/// [`super::CsfBands`] does not.
+/// Changed: the base is `L_a` over the CSF's peak instead of the TVI curve unless `raw_tvi` is set (TVI says 5.6 %
+/// where gratings are seen at 0.7 %, and F multiplies that), F is kept within 1 and 10 (else a textured pixel may err
+/// by 79 % of its background), the bands carry their measured frequencies, and the CSF is the one given, at the
+/// pixel's own adaptation for masking and at 100 cd/m² for F's frequency part. Contrast-weighted, F leaks from an
+/// edge into the flat beside it; [`super::CsfBands`] does not.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ramasubramanian {
     /// Whether thresholds start from the published TVI curve, not from `L_a` over the peak of contrast sensitivity.

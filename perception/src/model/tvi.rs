@@ -11,9 +11,9 @@ use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 
 /// The first idea: a pixel may err by what a large spot must differ from its background to be seen.
 ///
-/// T = TVI(`L_a`), stop at 1.96 σ ≤ T. The curve is Ward Larson et al.'s (1997), lowered by 0.95 log units if `shifted`. A large
-/// uniform spot is not pixel noise: in daylight the raw curve is 7 to 9 times more lenient than contrast
-/// sensitivity, and it knows neither resolution nor texture nor motion.
+/// T = TVI(`L_a`), stop at 1.96 σ ≤ T. The curve is Ward Larson et al.'s (1997), lowered by 0.95 log units if
+/// `shifted`. A large uniform spot is not pixel noise: in daylight the raw curve is 7 to 9 times more lenient than
+/// contrast sensitivity, and it knows neither resolution nor texture nor motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tvi {
     /// Whether the curve is lowered by 0.95 log units, to where contrast sensitivity puts it.

@@ -11,12 +11,13 @@ use crate::plane::Plane;
 use crate::tvi::ThresholdBase;
 
 /// "Spatiotemporal sensitivity and visual attention for efficient rendering of dynamic environments", ACM TOG 20(1),
-/// 2001: the Aleph map, ℵ = TVI(`L_a`) · Σ `R_i` `f_i` with `R_i` the share of band i in the local contrast and
-/// `f_i` = `S_max`(v) / S(`ρ_i`, v) above the peak of Daly's 1998 spatiovelocity CSF, 1 below; v is the velocity over the
+/// 2001: the Aleph map, ℵ = TVI(`L_a`) · Σ `R_i` `f_i` with `R_i` the share of band i in the local contrast and `f_i`
+/// = `S_max`(v) / S(`ρ_i`, v) above the peak of Daly's 1998 spatiovelocity CSF, 1 below; v is the velocity over the
 /// retina, given that the eye follows what attracts it.
 ///
-/// Changed: used as a pixel's tolerance instead of an irradiance cache's; `f_i` is capped (it reaches 1e9 at 10 deg/s); the base is
-/// `L_a` over the CSF's peak unless `raw_tvi` is set; elevations are computed in logs. The paper has no masking and neither has this.
+/// Changed: used as a pixel's tolerance instead of an irradiance cache's; `f_i` is capped (it reaches 1e9 at 10
+/// deg/s); the base is `L_a` over the CSF's peak unless `raw_tvi` is set; elevations are computed in logs. The paper
+/// has no masking and neither has this.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Yee {
     /// Whether thresholds start from the published TVI curve, not from `L_a` over the peak of contrast sensitivity.

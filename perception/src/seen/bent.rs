@@ -1,5 +1,5 @@
-//! Noise of colour through an operator that bends or clips each channel by itself, where a tint's noise is another matter on a colour
-//! than on a grey, and greys of a luminance say nothing of it.
+//! Noise of colour through an operator that bends or clips each channel by itself, where a tint's noise is another
+//! matter on a colour than on a grey, and greys of a luminance say nothing of it.
 
 use super::shown::{Noise, Shown, variances_of_opponent};
 use crate::opponent::{OPPONENT_OF_RGB, opponent};
@@ -14,9 +14,10 @@ static TINTS: LazyLock<[[f64; 3]; 2]> = LazyLock::new(|| {
     [1, 2].map(|signal| rgb_of_opponent.map(|row| row[signal]))
 });
 
-/// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², of a colour, linear Rec. 709 RGB of any strength, whose
-/// chromatic signals have the variances `of_tints`: what noise of its luminance makes of it, and what is not that, tints that come and go
-/// beside it. Noise of luminance is of the colour as far as there is noise of tints to go with it, and of grey as to the rest.
+/// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², of a colour, linear Rec. 709 RGB of
+/// any strength, whose chromatic signals have the variances `of_tints`: what noise of its luminance makes of it, and
+/// what is not that, tints that come and go beside it. Noise of luminance is of the colour as far as there is noise
+/// of tints to go with it, and of grey as to the rest.
 ///
 /// The colour itself is asked, since clips are its channels': of a blue wall under a white lamp nearly all noise of
 /// colour is noise of luminance, and where its blue is clipped hardly any of it shows. Taken as tints of a grey as
@@ -58,7 +59,8 @@ pub(super) fn variances_of_colour(
 /// Share of the colour's noise from which on grey is not asked for.
 const MOSTLY: f32 = 0.98;
 
-/// Half of what a colour's chromatic signals differ by as displayed, cd/m², between more and less of a tint. Colours in scene cd/m².
+/// Half of what a colour's chromatic signals differ by as displayed, cd/m², between more and less of a tint. Colours
+/// in scene cd/m².
 fn shown_tint(shown: &Shown<'_>, pixel: Pixel, rgb: [f64; 3], tint: [f64; 3]) -> [f32; 2] {
     if tint == [0.0; 3] {
         return [0.0; 2];

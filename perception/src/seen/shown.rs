@@ -72,7 +72,8 @@ impl Shown<'_> {
         (NoisyPixel { shown: self, pixel, noise, hue: Some(hue), points }, shown)
     }
 
-    /// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², where grey light comes and goes over a colour.
+    /// Variances of luminance, red–green and yellow–violet as displayed, (cd/m²)², where grey light comes and goes
+    /// over a colour.
     pub(super) fn variances_along_grey(&self, pixel: Pixel, noise: Noise, hue: [f32; 3]) -> [f32; 3] {
         let light = |scene: f64| {
             let grey = scene - noise.mean;
@@ -81,10 +82,10 @@ impl Shown<'_> {
         Points::of(noise, light).map_or([0.0; 3], |shown| variances_of_opponent(&shown, noise))
     }
 
-    /// Variance of the displayed luminance, (cd/m²)², where the operator multiplies by one number and nothing of the noise reaches what the
-    /// display cannot show, on a colour of which no channel does: the slope's square times the scene's, of which all that
-    /// [`NoisyPixel`] asks at three points and more comes to the same. `None` elsewhere. `tints`: variances of both chromatic signals,
-    /// of which none may reach beyond its room, `rooms_cd_m2` of black.
+    /// Variance of the displayed luminance, (cd/m²)², where the operator multiplies by one number and nothing of the
+    /// noise reaches what the display cannot show, on a colour of which no channel does: the slope's square times the
+    /// scene's, of which all that [`NoisyPixel`] asks at three points and more comes to the same. `None` elsewhere.
+    /// `tints`: variances of both chromatic signals, of which none may reach beyond its room, `rooms_cd_m2` of black.
     pub(super) fn variance_within_display(
         &self,
         noise: Noise,
@@ -177,8 +178,8 @@ impl<T: Copy> Points<T> {
         variance_of([0, 1, 2].map(|point| (weights[point], shown[point])))
     }
 
-    /// Variance of something that is shown, of which half is what a standard deviation shows where few samples bring the light: see
-    /// [`super::display_variance`].
+    /// Variance of something that is shown, of which half is what a standard deviation shows where few samples bring
+    /// the light: see [`super::display_variance`].
     fn variance(&self, noise: Noise, of: impl Fn(T) -> f32) -> f64 {
         let spread = self.spread(noise, &of);
         match self.of_few {
@@ -233,10 +234,10 @@ impl NoisyPixel<'_> {
         points.variance(self.noise, |relative| self.shown.emitted_cd_m2(relative)) as f32
     }
 
-    /// How much of the variances of both chromatic signals, `unbounded` (cd/m²)², fits the display: at most the square of the room that each
-    /// luminance leaves for a tint. `rooms_cd_m2`: of black. Nothing is taken off where few samples bring the light: of
-    /// a caustic at 2.5 times white most pixels are below white. Measured there: three points, which say that one in
-    /// five is below, leave a third of what shows.
+    /// How much of the variances of both chromatic signals, `unbounded` (cd/m²)², fits the display: at most the
+    /// square of the room that each luminance leaves for a tint. `rooms_cd_m2`: of black. Nothing is taken off where
+    /// few samples bring the light: of a caustic at 2.5 times white most pixels are below white. Measured there:
+    /// three points, which say that one in five is below, leave a third of what shows.
     pub(super) fn within_rooms(&self, unbounded: [f32; 2], rooms_cd_m2: [f64; 2]) -> [f32; 2] {
         let fits = |relative: f32| -> [f64; 2] {
             let share = f64::from((1.0 - relative).max(0.0));
@@ -264,9 +265,9 @@ impl NoisyPixel<'_> {
         sums.map(|sum| (sum / weights) as f32)
     }
 
-    /// Variances of red–green and yellow–violet as displayed, (cd/m²)², where noise of luminance brightens and darkens a colour, linear
-    /// Rec. 709 RGB of any strength, that the display then shows paler and less so. 0 where the colour fits the display at all points, or is white at
-    /// all of them.
+    /// Variances of red–green and yellow–violet as displayed, (cd/m²)², where noise of luminance brightens and
+    /// darkens a colour, linear Rec. 709 RGB of any strength, that the display then shows paler and less so. 0 where
+    /// the colour fits the display at all points, or is white at all of them.
     pub(super) fn variances_of_paling(&self, rgb: [f32; 3]) -> [f32; 2] {
         let strength = luminance(rgb);
         let (Some(points), true) = (&self.points, strength > 0.0 && strength.is_finite()) else { return [0.0; 2] };

@@ -67,10 +67,11 @@ fn eye_step(motion: &FrameMotion, pixel: usize, towards: Towards, display: &Disp
     (gain * x, gain * y)
 }
 
-/// The longest time over which a frame is smeared, seconds: of one that is held for longer the eye sees parts one after the other.
+/// The longest time over which a frame is smeared, seconds: of one that is held for longer the eye sees parts one
+/// after the other.
 const LONGEST_SMEAR_S: f64 = 1.0 / 24.0;
-/// Places that half a smear is summed over: for each pixel of its length, beside as many as tell which part of a short one lies within
-/// the pixel itself.
+/// Places that half a smear is summed over: for each pixel of its length, beside as many as tell which part of a
+/// short one lies within the pixel itself.
 const TAPS_PER_PIXEL: f32 = 2.0;
 const MIN_TAPS: f32 = 6.0;
 const MAX_TAPS: f32 = 64.0;
@@ -82,16 +83,18 @@ fn taps(length: f32) -> f32 {
     if length <= WITHIN_PIXEL { 1.0 } else { (MIN_TAPS + TAPS_PER_PIXEL * length).min(MAX_TAPS).ceil() }
 }
 
-/// The way of each pixel's retinal place over a frame, from where it is when the frame is half through its time, pixels.
+/// The way of each pixel's retinal place over a frame, from where it is when the frame is half through its time,
+/// pixels.
 #[derive(Clone, Copy, Debug)]
 struct Smear {
     backward: (f32, f32),
     forward: (f32, f32),
 }
 
-/// How an eye that follows smears a frame while it is held. Place and time are taken apart: a frame is smeared first, and weighed by
-/// its time then. Fresh noise keeps 0.81, 0.61, 0.46 and 0.36 of its visibility at rest under 2, 5, 10 and 20 pixels a frame so, where
-/// its moved spectrum says 0.89, 0.68, 0.51 and 0.37 (24 frames a second, 30 pixels a degree).
+/// How an eye that follows smears a frame while it is held. Place and time are taken apart: a frame is smeared first,
+/// and weighed by its time then. Fresh noise keeps 0.81, 0.61, 0.46 and 0.36 of its visibility at rest under 2, 5, 10
+/// and 20 pixels a frame so, where its moved spectrum says 0.89, 0.68, 0.51 and 0.37 (24 frames a second, 30 pixels a
+/// degree).
 pub(super) struct Smears(Vec<Smear>);
 
 impl Smears {
@@ -127,8 +130,8 @@ impl Smears {
     }
 }
 
-/// Share of a motion, in pixels a frame, that the eye goes along with. Its drift has no direction, and the contrast sensitivity
-/// function was measured with it.
+/// Share of a motion, in pixels a frame, that the eye goes along with. Its drift has no direction, and the contrast
+/// sensitivity function was measured with it.
 fn pursuit_gain((x, y): (f32, f32), display: &Display) -> f32 {
     let PixelDensity { horizontal, vertical, .. } = display.pixel_density();
     let degrees = (f64::from(x) / horizontal).hypot(f64::from(y) / vertical);

@@ -1,12 +1,13 @@
 //! What can be seen of the difference of two moving pictures.
 //!
-//! After Myszkowski, Rokita, Tawara, "Perceptually-informed accelerated rendering of high quality walkthrough sequences",
-//! 1999: a visible-differences predictor whose eye follows what moves. Theirs weighs still frames by Daly's spatiovelocity
-//! function of a velocity map. Here frames are brought together along the eye's way over the picture, and what then changes
-//! from frame to frame goes through castleCSF's temporal channels (Ashraf et al. 2024): noise that is new in every frame
-//! is integrated, error that travels with an object is seen nearly as in a still, and what is locked to the screen under a
-//! moving eye is blurred, all by one filter. A frame is looked at several times while it is shown, and counts as at the worst of them. Not for stills
-//! (see [`crate::difference`]; equal frames without end give the same), nor for frames that somebody may pause.
+//! After Myszkowski, Rokita, Tawara, "Perceptually-informed accelerated rendering of high quality walkthrough
+//! sequences", 1999: a visible-differences predictor whose eye follows what moves. Theirs weighs still frames by
+//! Daly's spatiovelocity function of a velocity map. Here frames are brought together along the eye's way over the
+//! picture, and what then changes from frame to frame goes through castleCSF's temporal channels (Ashraf et al.
+//! 2024): noise that is new in every frame is integrated, error that travels with an object is seen nearly as in a
+//! still, and what is locked to the screen under a moving eye is blurred, all by one filter. A frame is looked at
+//! several times while it is shown, and counts as at the worst of them. Not for stills (see [`crate::difference`];
+//! equal frames without end give the same), nor for frames that somebody may pause.
 
 mod gaze;
 
@@ -31,8 +32,8 @@ use rayon::prelude::*;
 const LOOKS_AT_ONCE: usize = 5;
 /// Of so many looks one is at colours, which are seen to flicker half as fast: it saves a quarter of the time.
 const LOOKS_PER_COLOUR: usize = 2;
-/// Frames with fewer looks than this are looked at for colours in all of them, as which of them is the right one depends on where the
-/// light changes.
+/// Frames with fewer looks than this are looked at for colours in all of them, as which of them is the right one
+/// depends on where the light changes.
 const FEW_LOOKS: usize = 5;
 
 /// A frame of two sequences that show the same, and how it moves.
@@ -131,8 +132,8 @@ impl SequenceObserver {
         self.responses.reach()
     }
 
-    /// A frame between others as it falls on the retina: an eye that follows smears it while it is held. Without motion nothing is
-    /// smeared.
+    /// A frame between others as it falls on the retina: an eye that follows smears it while it is held. Without
+    /// motion nothing is smeared.
     #[must_use]
     pub fn held(&self, frame: SequenceFrame) -> SequenceFrame {
         let Some(motion) = &frame.motion else { return frame };
@@ -145,9 +146,10 @@ impl SequenceObserver {
         SequenceFrame { reference: held(&frame.reference), test: held(&frame.test), ..frame }
     }
 
-    /// What is seen of the difference while frame `now` of these is shown, at the worst moment for each pixel. Frames within
-    /// [`Self::reach`] that would stand before the first or after the last are expected to be as those within it are in the mean,
-    /// where the eye's way leads over them: what stands still is seen as in a still, and noise as amid other frames.
+    /// What is seen of the difference while frame `now` of these is shown, at the worst moment for each pixel. Frames
+    /// within [`Self::reach`] that would stand before the first or after the last are expected to be as those within
+    /// it are in the mean, where the eye's way leads over them: what stands still is seen as in a still, and noise as
+    /// amid other frames.
     ///
     /// # Errors
     /// [`Error::SizeMismatch`] for frames of several sizes, [`Error::Empty`] unless there is a frame `now`.
@@ -188,8 +190,8 @@ impl SequenceObserver {
         Ok(Difference::of(greatest))
     }
 
-    /// Calls `visit` with each frame that reaches the one that is shown, by its number among the weights, and the pixel of it that
-    /// is where the eye sees `pixel` of that one.
+    /// Calls `visit` with each frame that reaches the one that is shown, by its number among the weights, and the
+    /// pixel of it that is where the eye sees `pixel` of that one.
     fn along_the_eyes_way<'f>(
         &self,
         frames: &[&'f SequenceFrame],
@@ -330,7 +332,8 @@ impl<'a> Filters<'a> {
         raise(greatest, &self.yellow_violet.visibility(yellow_violet));
     }
 
-    /// Visibility of a luminance difference whose sustained and transient parts are given; both channels add in amplitude.
+    /// Visibility of a luminance difference whose sustained and transient parts are given; both channels add in
+    /// amplitude.
     fn achromatic(&mut self, sustained: &Plane, transient: &Plane) -> Plane {
         let (sustained, transient) = (self.sustained.spectrum(sustained), self.transient.spectrum(transient));
         let mut energy = self.sustained.nothing();
@@ -343,8 +346,8 @@ impl<'a> Filters<'a> {
     }
 }
 
-/// Whether a look, of so many a frame, is at colours: the outermost ones are, and the others in turn from them to the middle, so that a
-/// frame before a change and one after it are seen alike.
+/// Whether a look, of so many a frame, is at colours: the outermost ones are, and the others in turn from them to the
+/// middle, so that a frame before a change and one after it are seen alike.
 fn is_at_colours(look: usize, count: usize) -> bool {
     count < FEW_LOOKS || look.min(count - 1 - look).is_multiple_of(LOOKS_PER_COLOUR)
 }

@@ -63,7 +63,8 @@ fn every_possible_display_shows_sequences() {
     assert!(SequenceObserver::new(&viewing).is_ok());
 }
 
-/// Noise that is new in every frame against the closed form that rendering is judged by, with its own standard error: 1° of noise.
+/// Noise that is new in every frame against the closed form that rendering is judged by, with its own standard error:
+/// 1° of noise.
 #[test]
 fn fresh_noise_is_seen_as_predicted() {
     for frames_per_second in [6.0, 12.0, 24.0, 60.0] {
@@ -108,7 +109,8 @@ fn flicker_has_its_contrast_over_threshold() {
     }
 }
 
-/// The worst of what is seen of grey of 100 cd/m² that is 3 % lighter and darker in turn, each for so many frames, over a whole period.
+/// The worst of what is seen of grey of 100 cd/m² that is 3 % lighter and darker in turn, each for so many frames,
+/// over a whole period.
 fn worst_of_square_wave(frames_per_second: f64, frames_a_phase: usize) -> f64 {
     let side = 16;
     let observer = SequenceObserver::new(&viewing(frames_per_second)).unwrap();
@@ -167,7 +169,8 @@ fn slow_changes_do_not_cancel() {
     }
 }
 
-/// Flicker of the picture as a whole by 1.5 % at 6 Hz is seen, by 0.5 % not; 1 % is at 0.87 of the threshold for 1 deg².
+/// Flicker of the picture as a whole by 1.5 % at 6 Hz is seen, by 0.5 % not; 1 % is at 0.87 of the threshold for 1
+/// deg².
 #[test]
 fn whole_frames_may_not_flicker() {
     let flicker =
@@ -189,9 +192,9 @@ fn the_eye_sees_what_travels_with_what_it_follows() {
     assert!(at_rest > 1.5 * under_moving_eye, "locked: {at_rest} at rest, {under_moving_eye} under a moving eye");
 }
 
-/// Noise that is new in every frame of 24 a second, under an eye that follows so many pixels a frame, over the same at rest:
-/// against energies of its spectrum, moved by frequency times velocity, by a script that is not kept. Smeared first and weighed by time
-/// then, frames keep up to 10 % less.
+/// Noise that is new in every frame of 24 a second, under an eye that follows so many pixels a frame, over the same
+/// at rest: against energies of its spectrum, moved by frequency times velocity, by a script that is not kept.
+/// Smeared first and weighed by time then, frames keep up to 10 % less.
 #[test]
 fn an_eye_that_follows_smears_noise() {
     let mut viewing = viewing(24.0);
@@ -217,7 +220,8 @@ fn an_eye_that_follows_smears_noise() {
     }
 }
 
-/// A sequence is cut out of something that goes on: noise of its first and last frames is no more visible than of those between.
+/// A sequence is cut out of something that goes on: noise of its first and last frames is no more visible than of
+/// those between.
 #[test]
 fn ends_of_a_sequence_are_seen_as_its_middle() {
     for (frames_per_second, right_px) in [(24.0, 0.0), (24.0, 10.0), (60.0, 0.0), (60.0, 4.0)] {
@@ -242,7 +246,8 @@ fn ends_of_a_sequence_are_seen_as_its_middle() {
     }
 }
 
-/// One coloured frame among grey ones is as visible just before it as just after, and the same flash on displays of any rate.
+/// One coloured frame among grey ones is as visible just before it as just after, and the same flash on displays of
+/// any rate.
 #[test]
 fn colours_are_seen_alike_before_and_after() {
     let side = 16;

@@ -58,8 +58,8 @@ fn texture_masks_and_its_own_noise_does_not() {
     assert!(known.mean() < 1.01 && unknown.mean() > 1.2, "known {} unknown {}", known.mean(), unknown.mean());
 }
 
-/// A denoised guide's texture is masked by less than if it were clean and by more than if all noise were left in it: by the mean of
-/// both, on a logarithmic scale.
+/// A denoised guide's texture is masked by less than if it were clean and by more than if all noise were left in it:
+/// by the mean of both, on a logarithmic scale.
 #[test]
 fn masks_of_a_denoised_guide_lie_between_two_bounds() {
     let texture = Plane::from_fn(192, 192, |x, y| 100.0 * (1.0 + 0.5 * hashed(x / 4, y / 4)));
@@ -79,8 +79,8 @@ fn masks_of_a_denoised_guide_lie_between_two_bounds() {
     assert!((at(&found, 144) / at(&at_most, 144) - 1.0).abs() < 0.02, "{} {}", at(&found, 144), at(&at_most, 144));
 }
 
-/// A grating beyond the centre of the last band of 8 cpd, at half its threshold, raises thresholds there by what Daly's formula says
-/// of any mask of half a threshold.
+/// A grating beyond the centre of the last band of 8 cpd, at half its threshold, raises thresholds there by what
+/// Daly's formula says of any mask of half a threshold.
 #[test]
 fn a_mask_counts_by_how_well_it_is_seen() {
     let (ppd, freq_cpd, luminance) = (38.0, 13.0, 10.0);
@@ -111,7 +111,8 @@ fn a_firefly_does_not_raise_its_threshold() {
     assert!((adapted - 20.0).abs() < 1e-3, "{adapted}");
 }
 
-/// A lamp far beyond what any display shows must not blind the transform to everything else: its rounding would be a mask everywhere.
+/// A lamp far beyond what any display shows must not blind the transform to everything else: its rounding would be a
+/// mask everywhere.
 #[test]
 fn one_lamp_does_not_mask_the_picture() {
     let textured = Plane::from_fn(256, 256, |x, y| 20.0 + ((x * 7 + y * 13) % 11) as f32 * 0.05);
@@ -170,7 +171,8 @@ fn pixels_need_not_be_square() {
         let (a, b) = (on_square.elevations[2].enlarged().get(2 * x, y), on_wide.elevations[2].enlarged().get(x, y));
         assert!((b / a - 1.0).abs() < 0.03, "elevation of the 2 cpd band at ({x}, {y}): {a}, {b}");
     }
-    // The same grating as an error, along x and then along y, is as visible on both; pooled, it has its contrast over threshold.
+    // The same grating as an error, along x and then along y, is as visible on both; pooled, it has its contrast over
+    // threshold.
     for along_y in [false, true] {
         let wave = |x: f32, y: f32| (std::f32::consts::TAU * 4.0 * if along_y { y } else { x }).cos();
         let of = |width: usize, step: f32, map: &ThresholdMap| {
@@ -284,9 +286,9 @@ fn hashed(x: usize, y: usize) -> f32 {
     (state % 10_007) as f32 / 10_007.0 - 0.5
 }
 
-/// A mirrored picture has the mirrored thresholds, in its first and last rows too: grids of masks start at one side, what they hold does
-/// not. Pixels of an even number of columns are on the grid in one of the two pictures and off it in the other. Of 96 columns thresholds
-/// differ by 2.6 % at the most.
+/// A mirrored picture has the mirrored thresholds, in its first and last rows too: grids of masks start at one side,
+/// what they hold does not. Pixels of an even number of columns are on the grid in one of the two pictures and off it
+/// in the other. Of 96 columns thresholds differ by 2.6 % at the most.
 #[test]
 fn a_mirrored_picture_has_the_mirrored_thresholds() {
     for (width, height, textured, tolerance) in [(96, 96, 96, 0.03), (255, 253, 120, 0.015)] {

@@ -13,9 +13,10 @@ use super::time::AdaptationState;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 
-/// All scene light is emitted as itself as far as the display reaches, each channel for itself: L is (L − black) / (white − black) of
-/// its light. A colour that the display's black greys too much, or that is too bright, keeps its luminance and is mixed with grey.
-/// What the screen reflects of the room comes on top and is not subtracted, as it would from a print beside it.
+/// All scene light is emitted as itself as far as the display reaches, each channel for itself: L is (L − black) /
+/// (white − black) of its light. A colour that the display's black greys too much, or that is too bright, keeps its
+/// luminance and is mixed with grey. What the screen reflects of the room comes on top and is not subtracted, as it
+/// would from a print beside it.
 ///
 /// For pictures that are display-referred already, for judging what a scene would look like through a window, and, with
 /// an exposure in stops, as a fixed exposure that looks at no picture.
@@ -46,7 +47,8 @@ impl FittedTone for FittedAbsolute {
         self.screen.relative(self.exposure * f64::from(scene_cd_m2.max(0.0)))
     }
 
-    /// Channel by channel, as the display's black is added to each: light that a display has shown comes back as it was.
+    /// Channel by channel, as the display's black is added to each: light that a display has shown comes back as it
+    /// was.
     fn map_rgb_at(&self, _pixel: Pixel, rgb_cd_m2: [f32; 3]) -> [f32; 3] {
         fit_into_display(rgb_cd_m2.map(|channel| self.screen.channel(self.exposure * f64::from(channel))))
     }

@@ -1,4 +1,5 @@
-//! Fine detail that an eye in dim light does not resolve, taken out of the picture for one in front of a bright display.
+//! Fine detail that an eye in dim light does not resolve, taken out of the picture for one in front of a bright
+//! display.
 //!
 //! By Shlaer's data in Ward Larson, Rushmeier and Piatko's fit (1997), for one adaptation luminance. Not for views
 //! whose parts are adapted to by themselves: the blur is one for all.
@@ -14,7 +15,8 @@ use crate::tvi::acuity_cpd;
 /// Loss of acuity of an eye in dim light: a Gaussian over the picture.
 ///
 /// At the highest frequency r that the scene's eye resolves ([`acuity_cpd`], Shlaer's data) it lets through just the
-/// contrast that the display's eye detects there, 1/S(r) of castleCSF: what the one cannot see, the other cannot either.
+/// contrast that the display's eye detects there, 1/S(r) of castleCSF: what the one cannot see, the other cannot
+/// either.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AcuityFilter {
     /// Standard deviation of the Gaussian, degrees.
@@ -41,8 +43,8 @@ impl AcuityFilter {
         Some(Self { sigma_deg, pixel_density })
     }
 
-    /// Share of a grating's amplitude that is left at `freq_cpd` cycles a degree. White noise of a renderer passes the same
-    /// filter: multiply a band's noise gain by it.
+    /// Share of a grating's amplitude that is left at `freq_cpd` cycles a degree. White noise of a renderer passes
+    /// the same filter: multiply a band's noise gain by it.
     #[must_use]
     pub fn transfer(&self, freq_cpd: f64) -> f64 {
         let phase = std::f64::consts::TAU * self.sigma_deg * freq_cpd;
@@ -71,8 +73,9 @@ impl AcuityFilter {
     }
 }
 
-/// A contrast sensitivity function behind a loss of acuity: how scene noise is seen that the operator blurs. Thresholds
-/// built with it hold for the noise as it is rendered, and of the picture as it is rendered: what masks is blurred, too.
+/// A contrast sensitivity function behind a loss of acuity: how scene noise is seen that the operator blurs.
+/// Thresholds built with it hold for the noise as it is rendered, and of the picture as it is rendered: what masks is
+/// blurred, too.
 pub struct BehindAcuity<C> {
     /// Contrast sensitivity function of the eye in front of the display.
     pub csf: C,
@@ -148,7 +151,8 @@ mod tests {
         }
     }
 
-    /// Noise behind the loss of acuity, on texture as it is rendered, is as visible as both through the filter to the eye itself.
+    /// Noise behind the loss of acuity, on texture as it is rendered, is as visible as both through the filter to the
+    /// eye itself.
     #[test]
     fn masks_are_blurred_as_they_are_shown() {
         use crate::threshold::{ThresholdInputs, threshold_map};

@@ -19,11 +19,12 @@ use crate::display::Viewing;
 use crate::photometry::luminance;
 use crate::primaries::{IDENTITY, Matrix, Primaries, apply, inverse, product};
 
-/// Film-like: colours move towards white as they brighten, over 16.5 stops, after the exposure of [`Constant`](super::Constant).
+/// Film-like: colours move towards white as they brighten, over 16.5 stops, after the exposure of
+/// [`Constant`](super::Constant).
 ///
 /// Troy Sobotka's AgX as Blender 4 ships it (Eary Chow's base for Rec. 2020): inset primaries, log₂ from −10 to +6.5
-/// stops about 0.18, a sigmoid of slope 2.4 and powers 1.5, a power of 2.4, 40 % of the per-channel hue shift, outset. Its
-/// guard rails for colours outside Rec. 2020 are left out: what comes in is Rec. 709.
+/// stops about 0.18, a sigmoid of slope 2.4 and powers 1.5, a power of 2.4, 40 % of the per-channel hue shift,
+/// outset. Its guard rails for colours outside Rec. 2020 are left out: what comes in is Rec. 709.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agx {
     /// Multiplies the scene: 2^stops.

@@ -15,7 +15,8 @@ use super::words::Shown;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 
-/// The exposure of [`Constant`](super::Constant), channels clipped: the "linear" of many viewers and engines. Bright colours change hue.
+/// The exposure of [`Constant`](super::Constant), channels clipped: the "linear" of many viewers and engines. Bright
+/// colours change hue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Linear {
     /// Multiplies the result: 2^stops.

@@ -8,12 +8,13 @@ use crate::plane::PIXELS_PER_TASK;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// `fitted` for a picture of these colours, linear Rec. 709 RGB of any strength, row-major: asked for the luminance of a scene luminance
-/// at a pixel, it takes that to have the pixel's colour. Anywhere else, at pixels without light, and of what is asked in colours it says
-/// what `fitted` does, which is given back as it is where it keeps luminance ([`FittedTone::keeps_luminance`]).
+/// `fitted` for a picture of these colours, linear Rec. 709 RGB of any strength, row-major: asked for the luminance
+/// of a scene luminance at a pixel, it takes that to have the pixel's colour. Anywhere else, at pixels without light,
+/// and of what is asked in colours it says what `fitted` does, which is given back as it is where it keeps luminance
+/// ([`FittedTone::keeps_luminance`]).
 ///
-/// For what works on planes of luminance ([`crate::seen`]). A blue wall at three times the display's white has `srgb`'s red and green
-/// far below their clip, and noise in them shows; predicted as a grey's, none of it does.
+/// For what works on planes of luminance ([`crate::seen`]). A blue wall at three times the display's white has
+/// `srgb`'s red and green far below their clip, and noise in them shows; predicted as a grey's, none of it does.
 #[must_use]
 pub fn coloured(fitted: Box<dyn FittedTone>, width: usize, rgb: &[[f32; 3]]) -> Box<dyn FittedTone> {
     if fitted.keeps_luminance() {

@@ -13,9 +13,9 @@ use crate::plane::Plane;
 /// How long a camera would expose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Exposure {
-    /// The geometric mean of the middle 94 % of the pixels becomes middle grey (0.18), unless that would clip more than
-    /// one pixel in twenty, when the 95 % point becomes white. Neither fireflies nor a small lamp in view move it, and a
-    /// night scene is not lifted until its windows burn out.
+    /// The geometric mean of the middle 94 % of the pixels becomes middle grey (0.18), unless that would clip more
+    /// than one pixel in twenty, when the 95 % point becomes white. Neither fireflies nor a small lamp in view move
+    /// it, and a night scene is not lifted until its windows burn out.
     #[default]
     Automatic,
     /// The darkest tenth ends at middle grey: detail in the shadows, whatever becomes of the rest.

@@ -1,4 +1,5 @@
-//! Rods and cones scaled each by its own thresholds: the frame of Ferwerda and others' and of Durand and Dorsey's operators.
+//! Rods and cones scaled each by its own thresholds: the frame of Ferwerda and others' and of Durand and Dorsey's
+//! operators.
 
 use serde::{Deserialize, Serialize};
 

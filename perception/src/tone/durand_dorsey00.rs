@@ -10,11 +10,12 @@ use super::{FittedTone, SceneGuide, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::luminance;
 
-/// [`Ferwerda96`](super::Ferwerda96) for walkthroughs: rods that fade by Walraven and Valeton's law, see blue, and adapt over time.
+/// [`Ferwerda96`](super::Ferwerda96) for walkthroughs: rods that fade by Walraven and Valeton's law, see blue, and
+/// adapt over time.
 ///
-/// Durand and Dorsey, "Interactive tone mapping", Eurographics Workshop on Rendering 2000. The paper's text could not be
-/// had. The weight and the tint are those that independent implementations agree on; for the time constants (0.1 s for cones,
-/// 0.4 s for rods) there is no source at hand; its chromatic adaptation and flare are left out.
+/// Durand and Dorsey, "Interactive tone mapping", Eurographics Workshop on Rendering 2000. The paper's text could not
+/// be had. The weight and the tint are those that independent implementations agree on; for the time constants (0.1 s
+/// for cones, 0.4 s for rods) there is no source at hand; its chromatic adaptation and flare are left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DurandDorsey00 {
     /// Multiplies the result: 2^stops.

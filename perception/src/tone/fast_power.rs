@@ -1,8 +1,9 @@
-//! Powers by tables: what a tone operator needs at every pixel, several times faster than `powf` and the same on every machine.
+//! Powers by tables: what a tone operator needs at every pixel, several times faster than `powf` and the same on
+//! every machine.
 //!
-//! A number is 2^e m with m in 1..2. Powers of both are looked up, m's between 512 places by a straight line. Relative error
-//! below 3e-7 for exponents from 0 to 1.5, far below the hundredth that an eye can tell; not for statistics or
-//! thresholds, which need the derivative too.
+//! A number is 2^e m with m in 1..2. Powers of both are looked up, m's between 512 places by a straight line.
+//! Relative error below 3e-7 for exponents from 0 to 1.5, far below the hundredth that an eye can tell; not for
+//! statistics or thresholds, which need the derivative too.
 
 use std::sync::LazyLock;
 
@@ -73,8 +74,8 @@ static LOGARITHMS: LazyLock<Logarithms> = LazyLock::new(|| {
     }
 });
 
-/// Each x^exponent for x ≥ 0 and a finite exponent ≥ 0. Absolute error of the logarithm below 1e-6, so that a ratio of 1000 to
-/// the power of 1 is off by less than 1e-5.
+/// Each x^exponent for x ≥ 0 and a finite exponent ≥ 0. Absolute error of the logarithm below 1e-6, so that a ratio
+/// of 1000 to the power of 1 is off by less than 1e-5.
 #[inline]
 pub(super) fn powers(bases: [f32; 3], exponent: f32) -> [f32; 3] {
     let tables = &*LOGARITHMS;

@@ -14,8 +14,8 @@ use crate::display::Viewing;
 /// resolve in dim light is blurred.
 ///
 /// "A model of visual adaptation for realistic image synthesis", SIGGRAPH 1996. `L_d` = `m_p` L + k `m_s` V with
-/// `m_p` = `T_p`(`L_da`) / `T_p`(`L_wa`) and `m_s` = `T_p`(`L_da`) / `T_s`(`L_wa`), `L_da` half the display's white: the
-/// display is looked at with cones. (Some implementations have `T_s`(`L_da`) there, which is 6.5 times brighter.)
+/// `m_p` = `T_p`(`L_da`) / `T_p`(`L_wa`) and `m_s` = `T_p`(`L_da`) / `T_s`(`L_wa`), `L_da` half the display's white:
+/// the display is looked at with cones. (Some implementations have `T_s`(`L_da`) there, which is 6.5 times brighter.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ferwerda96 {
     /// Multiplies the result: 2^stops.
@@ -100,7 +100,8 @@ mod tests {
         assert!(law(10.0).rod_weight.abs() < 1e-12 && law(1e-6).rod_weight <= 1.0);
     }
 
-    /// A step of one threshold in the scene is a step of one threshold on the display, for each kind of receptor by its law.
+    /// A step of one threshold in the scene is a step of one threshold on the display, for each kind of receptor by
+    /// its law.
     #[test]
     fn thresholds_are_kept() {
         let viewing = Viewing::of(Display { white_cd_m2: 100.0, black_cd_m2: 0.0, ..Display::default() });

@@ -14,8 +14,8 @@ pub enum AdaptationScope {
     /// One state for the view.
     #[default]
     World,
-    /// The geometric mean over a Gaussian of σ 0.25° (as wide as a disc of 1°) at each pixel: more contrast in all parts, at
-    /// the price of contrast reversed along strong edges.
+    /// The geometric mean over a Gaussian of σ 0.25° (as wide as a disc of 1°) at each pixel: more contrast in all
+    /// parts, at the price of contrast reversed along strong edges.
     Local,
 }
 

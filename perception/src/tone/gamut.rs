@@ -40,9 +40,9 @@ fn desaturate(rgb: [f32; 3], grey: f32) -> [f32; 3] {
 /// Brighter than anything that is not shown as white, and far from where squares of luminances end.
 const BRIGHTEST_CD_M2: f32 = 1e15;
 
-/// `rgb` as light that Rec.709 holds: a colour outside it, which has negative channels, is mixed with the grey of its own
-/// luminance until none is negative. Channels that are no number become 0, infinite ones very bright; what has no luminance
-/// above 0 is black.
+/// `rgb` as light that Rec.709 holds: a colour outside it, which has negative channels, is mixed with the grey of its
+/// own luminance until none is negative. Channels that are no number become 0, infinite ones very bright; what has no
+/// luminance above 0 is black.
 #[must_use]
 pub fn light(rgb: [f32; 3]) -> [f32; 3] {
     let rgb = rgb.map(|channel| match channel {

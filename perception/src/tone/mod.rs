@@ -1,9 +1,9 @@
 //! Tone operators: from scene luminance to what a display shows.
 //!
-//! An operator is first fitted to a denoised guide of the picture, to who looks at which display, and, over time, to what
-//! the eye is adapted to. The fit is frozen, so that the same scene light always becomes the same display light while a
-//! picture refines, and error can be judged as it will be seen; and it is made of numbers, so that it can be saved with
-//! the picture ([`SavedTone`]).
+//! An operator is first fitted to a denoised guide of the picture, to who looks at which display, and, over time, to
+//! what the eye is adapted to. The fit is frozen, so that the same scene light always becomes the same display light
+//! while a picture refines, and error can be judged as it will be seen; and it is made of numbers, so that it can be
+//! saved with the picture ([`SavedTone`]).
 //!
 //! Scene light is cd/m², display light linear, 0 for the display's black and 1 for its white. The display's transfer
 //! function is not the operator's business: see [`Eotf`](crate::Eotf).
@@ -79,13 +79,14 @@ use acuity::AcuityFilter;
 
 /// A way to bring scene light onto a display. Its `Debug` form tells operators of different settings apart.
 ///
-/// One of your own can choose among this crate's fits, by what it sees of the guide; fits of another kind cannot be made ([`FittedTone`]).
+/// One of your own can choose among this crate's fits, by what it sees of the guide; fits of another kind cannot be
+/// made ([`FittedTone`]).
 pub trait ToneOperator: Send + Sync + Debug {
     /// The operator's name on the command line.
     fn name(&self) -> &'static str;
 
-    /// Freezes the operator for one picture, its observer, and, where time passes, what the observer's eyes are adapted to;
-    /// without a state they are adapted to the picture.
+    /// Freezes the operator for one picture, its observer, and, where time passes, what the observer's eyes are
+    /// adapted to; without a state they are adapted to the picture.
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone>;
 
     /// What eyes would adapt to if the view stayed as the guide shows it: the goal of [`AdaptationState::after`].
@@ -134,10 +135,11 @@ const MIN_GREY_CD_M2: f32 = 1e-6;
 
 /// A tone operator with every parameter decided.
 ///
-/// There are those of this crate and no others: each can be kept with a picture, as one of the kinds that a [`SavedTone`] holds.
+/// There are those of this crate and no others: each can be kept with a picture, as one of the kinds that a
+/// [`SavedTone`] holds.
 pub trait FittedTone: Send + Sync + Debug {
-    /// Linear display light for a grey of scene luminance `scene_cd_m2` at `pixel`, or for the pixel's own colour ([`coloured()`]): 0 is the
-    /// display's black, 1 its white.
+    /// Linear display light for a grey of scene luminance `scene_cd_m2` at `pixel`, or for the pixel's own colour
+    /// ([`coloured()`]): 0 is the display's black, 1 its white.
     ///
     /// May exceed 1, which the display then clips; never NaN, never falls as its argument rises. NaN counts as black.
     fn relative_luminance_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32;
@@ -156,9 +158,9 @@ pub trait FittedTone: Send + Sync + Debug {
 
     /// Linear display RGB in 0..1 for scene RGB in cd/m² at `pixel`.
     ///
-    /// Unless the operator says otherwise the colour is scaled to the operator's luminance; what then does not fit the
-    /// display is mixed with the grey of equal luminance until it does, which keeps hue and luminance where clipping each
-    /// channel would not.
+    /// Unless the operator says otherwise the colour is scaled to the operator's luminance; what then does not fit
+    /// the display is mixed with the grey of equal luminance until it does, which keeps hue and luminance where
+    /// clipping each channel would not.
     fn map_rgb_at(&self, pixel: Pixel, rgb_cd_m2: [f32; 3]) -> [f32; 3] {
         let rgb = gamut::light(rgb_cd_m2);
         let scene = luminance(rgb);
@@ -171,8 +173,9 @@ pub trait FittedTone: Send + Sync + Debug {
         self.map_rgb_at(Pixel::NOWHERE, rgb_cd_m2)
     }
 
-    /// Display light, 0 to 1, for each cd/m² of a chromatic signal of the scene: what is left of a faint tint on a grey of luminance
-    /// `scene_cd_m2` at `pixel`. What a clip of the display hides of it is not taken off, since noise may reach below.
+    /// Display light, 0 to 1, for each cd/m² of a chromatic signal of the scene: what is left of a faint tint on a
+    /// grey of luminance `scene_cd_m2` at `pixel`. What a clip of the display hides of it is not taken off, since
+    /// noise may reach below.
     ///
     /// Unless the operator says otherwise it keeps the ratios of a colour's channels.
     fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
@@ -180,14 +183,14 @@ pub trait FittedTone: Send + Sync + Debug {
         self.relative_luminance_at(pixel, luminance).min(1.0) / luminance
     }
 
-    /// Display light, 0 to 1 and on, for each cd/m² of the scene, where that is one number for all greys of the picture; `None` where greys
-    /// are bent.
+    /// Display light, 0 to 1 and on, for each cd/m² of the scene, where that is one number for all greys of the
+    /// picture; `None` where greys are bent.
     fn relative_per_cd_m2(&self) -> Option<f64> {
         None
     }
 
-    /// Whether every colour is shown as bright as a grey of its luminance, and so as white where that is. Not where each channel is bent
-    /// or clipped by itself: a blue of any luminance stays blue ([`coloured()`]).
+    /// Whether every colour is shown as bright as a grey of its luminance, and so as white where that is. Not where
+    /// each channel is bent or clipped by itself: a blue of any luminance stays blue ([`coloured()`]).
     fn keeps_luminance(&self) -> bool {
         true
     }

@@ -19,13 +19,13 @@ use super::{FittedTone, MIN_GREY_CD_M2, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::{luminance, scotopic_luminance};
 
-/// Responses of rods and cones at their state of adaptation, shown so that a display's eye responds the same: dazzled and
-/// blinded eyes included.
+/// Responses of rods and cones at their state of adaptation, shown so that a display's eye responds the same: dazzled
+/// and blinded eyes included.
 ///
-/// "Time-dependent visual adaptation for fast realistic image display", SIGGRAPH 2000; constants as `pfstmo_pattanaik00`
-/// has them. Reference white is 5 times, black 5/32 of what the eye is adapted to; on the display white is white. Without a
-/// state the eye is adapted to the geometric mean of the picture. Colour strength follows the slope of the cones' response
-/// with its luminance kept, and rods see grey.
+/// "Time-dependent visual adaptation for fast realistic image display", SIGGRAPH 2000; constants as
+/// `pfstmo_pattanaik00` has them. Reference white is 5 times, black 5/32 of what the eye is adapted to; on the
+/// display white is white. Without a state the eye is adapted to the geometric mean of the picture. Colour strength
+/// follows the slope of the cones' response with its luminance kept, and rods see grey.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pattanaik00 {
     /// Multiplies the result: 2^stops.
@@ -143,7 +143,8 @@ impl Appearance {
     }
 }
 
-/// The cones of who looks at the display, adapted to a fifth of its white. Their few rods are left out, as in the paper.
+/// The cones of who looks at the display, adapted to a fifth of its white. Their few rods are left out, as in the
+/// paper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct DisplayEye {
     sigma_cd_m2: f64,

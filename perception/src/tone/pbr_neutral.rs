@@ -17,7 +17,8 @@ use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::luminance;
 
-/// Shows base colours as they are and compresses highlights above 0.8, after the exposure of [`Constant`](super::Constant).
+/// Shows base colours as they are and compresses highlights above 0.8, after the exposure of
+/// [`Constant`](super::Constant).
 ///
 /// Khronos PBR Neutral Tone Mapper, specification of May 2024: `F_90` 0.04 is subtracted from all channels (less of it
 /// near black), `K_s` = 0.8 − 0.04, `K_d` = 0.15.

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use super::{FittedTone, Pixel};
 
-/// Linear display RGB in 0..1 for a picture in scene cd/m², row by row, `width` pixels wide: the operator's loss of acuity
-/// first, then its colours, rows in parallel.
+/// Linear display RGB in 0..1 for a picture in scene cd/m², row by row, `width` pixels wide: the operator's loss of
+/// acuity first, then its colours, rows in parallel.
 #[must_use]
 pub fn map_picture(fitted: &dyn FittedTone, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Vec<[f32; 3]> {
     match fitted.acuity() {

@@ -18,12 +18,13 @@ use crate::display::Viewing;
 use crate::filter::gaussian_blur;
 use crate::plane::Plane;
 
-/// The picture's geometric mean becomes middle grey, and L (1 + L / `L_white`²) / (1 + L) brings the brightest pixel to white.
+/// The picture's geometric mean becomes middle grey, and L (1 + L / `L_white`²) / (1 + L) brings the brightest pixel
+/// to white.
 ///
 /// "Photographic tone reproduction for digital images", SIGGRAPH 2002: key 0.18, equation 4. With
-/// [`AdaptationScope::Local`] equation 9, dodging and burning: each pixel is divided by the mean of the largest surround of
-/// even luminance (eight scales in steps of 1.6, φ = 8, ε = 0.05). It knows no unit: only ratios count, and pixels below
-/// 1e-10 of the brightest, fireflies aside, are no part of the mean.
+/// [`AdaptationScope::Local`] equation 9, dodging and burning: each pixel is divided by the mean of the largest
+/// surround of even luminance (eight scales in steps of 1.6, φ = 8, ε = 0.05). It knows no unit: only ratios count,
+/// and pixels below 1e-10 of the brightest, fireflies aside, are no part of the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reinhard02 {
     /// Multiplies the scene: 2^stops.

@@ -4,7 +4,8 @@ use super::{SceneGuide, ToneOperator};
 use crate::photometry::{luminance, scotopic_luminance};
 use crate::plane::Plane;
 
-/// What an operator looks at of a picture in colour: the luminance that the cones see, and the rods' where it asks for it.
+/// What an operator looks at of a picture in colour: the luminance that the cones see, and the rods' where it asks
+/// for it.
 #[derive(Clone, Debug)]
 pub struct SceneLight {
     photopic_cd_m2: Plane,
@@ -76,8 +77,8 @@ impl SceneLight {
         }
     }
 
-    /// Pictures one below the other, each enlarged to `width` × `height` by repeating its pixels: a guide to all of them, for operators
-    /// that count degrees. Without the rods' light unless all have it.
+    /// Pictures one below the other, each enlarged to `width` × `height` by repeating its pixels: a guide to all of
+    /// them, for operators that count degrees. Without the rods' light unless all have it.
     #[must_use]
     pub fn stacked(pictures: &[&Self], width: usize, height: usize) -> Self {
         let stacked = |planes: Vec<&Plane>| {
@@ -134,8 +135,8 @@ fn guide_of<'a>((luminance_cd_m2, scotopic_cd_m2): (&'a Plane, Option<&'a Plane>
 /// A pixel of which less is covered is an edge of its neighbours, and what few samples of it found is mostly noise.
 const HALF_COVERED: f32 = 0.5;
 
-/// Light that is divided by its alpha, no brighter than the brightest that is covered whole; as it stands where it is more than that,
-/// as flames and glows are, which cover little and are no lamps. NaN where nothing is, or little.
+/// Light that is divided by its alpha, no brighter than the brightest that is covered whole; as it stands where it is
+/// more than that, as flames and glows are, which cover little and are no lamps. NaN where nothing is, or little.
 fn light_of_what_covers(plane: &Plane, alpha: &[f32]) -> Plane {
     let covered = plane.values().iter().zip(alpha);
     let whole = |(light, alpha): (&f32, &f32)| if *alpha >= 1.0 { *light } else { 0.0 };

@@ -10,8 +10,9 @@ use super::ward94::scale_factor;
 use super::{FittedTone, Pixel, SceneGuide, ToneOperator};
 use crate::display::{PixelDensity, Viewing};
 
-/// [`Ward94`](super::Ward94) with the world adaptation from some hundred points of the view, most of them at its centre (or where the eye
-/// looks), as rays into the scene would give it: cheap enough for each frame, whatever the picture's size.
+/// [`Ward94`](super::Ward94) with the world adaptation from some hundred points of the view, most of them at its
+/// centre (or where the eye looks), as rays into the scene would give it: cheap enough for each frame, whatever the
+/// picture's size.
 ///
 /// "Tone reproduction for interactive walkthroughs", Computer Graphics Forum 19(3), 2000. The paper's text could not be
 /// had: that the sample is centre-weighted is stated by others, the Gaussian and its width are ours.

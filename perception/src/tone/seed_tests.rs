@@ -1,5 +1,5 @@
-//! The listings of the founding paper's appendix, faults and all: the proof that each fault is real, beside what the operators do
-//! instead. Constants of ours are held to reference values in the operators' own tests.
+//! The listings of the founding paper's appendix, faults and all: the proof that each fault is real, beside what the
+//! operators do instead. Constants of ours are held to reference values in the operators' own tests.
 
 use super::*;
 use crate::display::Display;
@@ -203,8 +203,8 @@ fn seed_starlight_is_a_negative() {
     assert!(fit.relative_luminance(2e-4) >= fit.relative_luminance(1e-4));
 }
 
-/// F2, F3, F4: one scale from one curve, for a display adaptation of 25, with a rounded constant; red is as bright by night
-/// as by day.
+/// F2, F3, F4: one scale from one curve, for a display adaptation of 25, with a rounded constant; red is as bright by
+/// night as by day.
 #[test]
 fn seed_ferwerda_is_one_scale() {
     let scale = |adaptation: f64| ferwerda([0.01; 3], adaptation)[0] / 0.01;
@@ -225,8 +225,8 @@ fn seed_tvi_passes_nan() {
     assert!(crate::tvi::combined(f64::NAN).is_finite());
 }
 
-/// W1, W4: luminances are taken for their logarithms, so that ceilings are those of exp(505) cd/m². A grey wall is then shown
-/// with many times the contrast that it has.
+/// W1, W4: luminances are taken for their logarithms, so that ceilings are those of exp(505) cd/m². A grey wall is
+/// then shown with many times the contrast that it has.
 #[test]
 fn seed_histogram_takes_no_logarithm() {
     let mut samples = vec![505.0; 2900];
@@ -269,7 +269,8 @@ fn seed_ceilings_never_reach_zero() {
     // One sample a bin is at its ceiling of 1: the whole display for a hundredth of a cd/m².
     let contrast = seed.shown(9e-3) / seed.shown(0.0);
     assert!(contrast > 0.6 * SeedHistogram::RANGE, "{contrast}");
-    // Ours, from ten samples of a degree each: next to nothing of the display, since an eye in such light sees next to nothing.
+    // Ours, from ten samples of a degree each: next to nothing of the display, since an eye in such light sees next
+    // to nothing.
     let fit = ours("wrp", &Plane::from_fn(600, 60, |x, _| 1e-3 * (x / 60) as f32));
     let brightest = fit.relative_luminance(9e-3);
     assert!(brightest < 0.05, "{brightest}");
@@ -299,8 +300,8 @@ fn seed_model_loses_colour() {
     assert!(shown[0] / shown[2] > 3.5, "{shown:?}");
 }
 
-/// P8, P10: rods and cones add up to more than 1 in the dark, which inverts to a luminance of millions, though the rods' half-saturation
-/// is five times what the paper has.
+/// P8, P10: rods and cones add up to more than 1 in the dark, which inverts to a luminance of millions, though the
+/// rods' half-saturation is five times what the paper has.
 #[test]
 fn seed_model_whites_out() {
     check("ptyg_sigma_rod_seed", 1e-6, |row| pattanaik(100.0, row[0]).sigma_rod);

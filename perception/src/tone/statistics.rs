@@ -6,8 +6,8 @@ use crate::plane::Plane;
 
 /// The floor of human vision, cd/m².
 pub(super) const FLOOR_CD_M2: f32 = 1e-4;
-/// Share of the brightest pixel at and below which a pixel says nothing to an operator that knows only ratios: leaked light
-/// and rounding, not darkness.
+/// Share of the brightest pixel at and below which a pixel says nothing to an operator that knows only ratios: leaked
+/// light and rounding, not darkness.
 const FAINTEST_SHARE: f32 = 1e-10;
 /// Pixels summed by one thread at a time. Sums are added in the picture's order, whatever the number of threads.
 const CHUNK: usize = 1 << 14;
@@ -16,8 +16,8 @@ const CHUNK: usize = 1 << 14;
 const ORDINARY: f64 = 0.95;
 /// Share of that light at and below which a pixel says nothing about exposure: 20 stops, more than a camera records.
 const DARKEST_SHARE: f32 = 1e-6;
-/// Share of the picture's pixels that are too few to make all others darkness: fireflies, the disc of the sun. More of them, 20 stops
-/// above everything else, hold 99.9 % of the light and are what there is to see.
+/// Share of the picture's pixels that are too few to make all others darkness: fireflies, the disc of the sun. More
+/// of them, 20 stops above everything else, hold 99.9 % of the light and are what there is to see.
 const TOO_FEW: f64 = 1e-3;
 /// Pixels of a small picture that are too few in any case: a firefly, or a pair with its neighbours.
 const TOO_FEW_PIXELS: usize = 4;
@@ -32,8 +32,8 @@ pub(super) fn log_average_to_eyes(luminance_cd_m2: &Plane) -> Option<f64> {
     log_average(luminance_cd_m2, as_eyes_see)
 }
 
-/// Light for what blurs a picture: where nothing is (NaN) the geometric mean of the rest, which the view as a whole is adapted to;
-/// infinite light is none.
+/// Light for what blurs a picture: where nothing is (NaN) the geometric mean of the rest, which the view as a whole
+/// is adapted to; infinite light is none.
 pub(super) fn filled(plane: &Plane) -> Plane {
     let has_holes = plane.values().iter().any(|value| value.is_nan());
     let average = if has_holes { log_average_to_eyes(plane) } else { None }.unwrap_or(0.0) as f32;
@@ -105,9 +105,9 @@ impl LogSum {
     }
 }
 
-/// Scene luminances that say something about exposure, in rising order. Blacks do not (an empty background is no reason to
-/// expose longer), and neither do values that are not finite. How dark a black is is a ratio, as a camera knows no unit:
-/// a picture and the same one a thousand times darker are exposed to the same.
+/// Scene luminances that say something about exposure, in rising order. Blacks do not (an empty background is no
+/// reason to expose longer), and neither do values that are not finite. How dark a black is is a ratio, as a camera
+/// knows no unit: a picture and the same one a thousand times darker are exposed to the same.
 #[derive(Clone, Debug)]
 pub(super) struct SceneStatistics {
     sorted_cd_m2: Vec<f32>,
@@ -136,19 +136,19 @@ impl SceneStatistics {
     }
 }
 
-/// At and below which a pixel of a picture of `pixel_count`, whose lit ones are `sorted_cd_m2`, is darkness; 0 where all that is
-/// lit counts.
+/// At and below which a pixel of a picture of `pixel_count`, whose lit ones are `sorted_cd_m2`, is darkness; 0 where
+/// all that is lit counts.
 ///
-/// What may be exposed for lies within 20 stops of the brightest pixel, and where that is [`TOO_FEW`] pixels, of the brightest
-/// below them. A quantile of all that is lit would not do: it is leaked light itself wherever a leaking background is
-/// most of the picture. Measured with such a quantile, pixels of 20 to 100 cd/m² before a background of 1e-6: where
-/// they are 4.8 % of the picture they are exposed 4e7 times as long as where they are 5.3 %.
+/// What may be exposed for lies within 20 stops of the brightest pixel, and where that is [`TOO_FEW`] pixels, of the
+/// brightest below them. A quantile of all that is lit would not do: it is leaked light itself wherever a leaking
+/// background is most of the picture. Measured with such a quantile, pixels of 20 to 100 cd/m² before a background of
+/// 1e-6: where they are 4.8 % of the picture they are exposed 4e7 times as long as where they are 5.3 %.
 fn floor_cd_m2(sorted_cd_m2: &[f32], pixel_count: usize) -> f32 {
     DARKEST_SHARE * quantile(enough_of_the_brightest(sorted_cd_m2, pixel_count), ORDINARY).unwrap_or(0.0)
 }
 
-/// Of the lit pixels of a picture of `pixel_count`, in rising order, those within 20 stops of the brightest one, or where these are
-/// [`TOO_FEW`], of the brightest below them; empty where all are too few.
+/// Of the lit pixels of a picture of `pixel_count`, in rising order, those within 20 stops of the brightest one, or
+/// where these are [`TOO_FEW`], of the brightest below them; empty where all are too few.
 fn enough_of_the_brightest(sorted: &[f32], pixel_count: usize) -> &[f32] {
     let too_few = TOO_FEW_PIXELS.max((TOO_FEW * pixel_count as f64) as usize);
     let mut left = sorted;
@@ -212,7 +212,8 @@ mod tests {
         }
     }
 
-    /// Eyes are in the dark where nothing can be seen; a background that crosses the floor of vision changes nothing at once.
+    /// Eyes are in the dark where nothing can be seen; a background that crosses the floor of vision changes nothing
+    /// at once.
     #[test]
     fn darkness_counts_to_eyes() {
         let adapted = |background: f32| {

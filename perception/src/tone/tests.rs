@@ -257,9 +257,9 @@ fn a_picture_is_mapped_as_its_pixels_are_with_any_number_of_threads() {
     }
 }
 
-/// What a picture does not cover changes nothing of what is shown, whatever an operator makes of darkness; and those that make something
-/// of it say so. Regression: eyes took what is not covered for night, and a daylit figure in a picture of which 85 %
-/// were nothing came out flat white.
+/// What a picture does not cover changes nothing of what is shown, whatever an operator makes of darkness; and those
+/// that make something of it say so. Regression: eyes took what is not covered for night, and a daylit figure in a
+/// picture of which 85 % were nothing came out flat white.
 #[test]
 fn what_is_not_there_is_not_adapted_to() {
     let lit = |x: usize, y: usize| if (x + y).is_multiple_of(2) { 800.0 } else { 4000.0 };

@@ -31,9 +31,9 @@ impl Goal {
         Self { cones_cd_m2: luminance_cd_m2, rods_cd_m2: luminance_cd_m2 }
     }
 
-    /// The geometric mean of what is in view, around the gaze where one is given (a Gaussian of σ 5°); of a gaze beside the picture,
-    /// around the picture's nearest pixel, since nothing is known of what is seen there. What is darker than
-    /// the floor of vision, 1e-4 cd/m², counts as the floor; without a view the eye is in the dark.
+    /// The geometric mean of what is in view, around the gaze where one is given (a Gaussian of σ 5°); of a gaze
+    /// beside the picture, around the picture's nearest pixel, since nothing is known of what is seen there. What is
+    /// darker than the floor of vision, 1e-4 cd/m², counts as the floor; without a view the eye is in the dark.
     #[must_use]
     pub fn of(guide: &SceneGuide<'_>, density: PixelDensity) -> Self {
         let average = |plane| match guide.gaze {
@@ -94,8 +94,8 @@ impl Kinetics {
         cones: ReceptorKinetics { neural_s: 0.080, pigment_s: 110.0, half_bleach_cd_m2: 2e6 },
         rods: ReceptorKinetics { neural_s: 0.150, pigment_s: 400.0, half_bleach_cd_m2: 0.04 },
     };
-    /// What stands in for Durand and Dorsey 2000, whose text could not be had: neural time constants of 0.1 s and 0.4 s, which no source
-    /// at hand confirms. The pigment is [`Kinetics::PATTANAIK_2000`]'s.
+    /// What stands in for Durand and Dorsey 2000, whose text could not be had: neural time constants of 0.1 s and 0.4
+    /// s, which no source at hand confirms. The pigment is [`Kinetics::PATTANAIK_2000`]'s.
     pub const DURAND_DORSEY_2000: Self = Self {
         cones: ReceptorKinetics { neural_s: 0.1, ..Self::PATTANAIK_2000.cones },
         rods: ReceptorKinetics { neural_s: 0.4, ..Self::PATTANAIK_2000.rods },
@@ -155,8 +155,8 @@ impl AdaptationState {
 
     /// The state `seconds` later, when what is in view has gone evenly from the last goal to `goal`.
     ///
-    /// Exact for a goal that stays or changes at a constant rate, so that the curve does not depend on the frame rate; a
-    /// time that is not positive and finite changes the goal only.
+    /// Exact for a goal that stays or changes at a constant rate, so that the curve does not depend on the frame
+    /// rate; a time that is not positive and finite changes the goal only.
     #[must_use]
     pub fn after(self, goal: Goal, seconds: f64, kinetics: &Kinetics) -> Self {
         if !(seconds > 0.0 && seconds.is_finite()) {
@@ -202,8 +202,9 @@ impl Ramp {
 
     /// B' = ((1 − B) − B G / G₀) / t₀.
     ///
-    /// For a constant G this is one exponential. On a ramp the time is cut where G has grown by half a per cent, and G is
-    /// its mean within each piece: the rods' rate, (1 + G / 0.04) / 400 s, is far too fast for Euler steps of a frame.
+    /// For a constant G this is one exponential. On a ramp the time is cut where G has grown by half a per cent, and
+    /// G is its mean within each piece: the rods' rate, (1 + G / 0.04) / 400 s, is far too fast for Euler steps of a
+    /// frame.
     fn pigment(self, start: f64, kinetics: &ReceptorKinetics) -> f64 {
         let (first, last) = (kinetics.half_bleach_cd_m2 + self.from, kinetics.half_bleach_cd_m2 + self.to);
         let steps = ((last / first).ln().abs() / MAX_STEP_RATIO.ln()).ceil().clamp(1.0, MAX_STEPS);

@@ -11,8 +11,8 @@ const TINTS: [[f32; 3]; 2] =
 /// Strength of the tint, over the grey that is tinted.
 const STRENGTH: f32 = 0.02;
 
-/// Chromatic signals of display light over those of the scene, cd/m², that make a faint tint on a grey of this luminance: the
-/// mean of both tints. For operators that keep greys grey.
+/// Chromatic signals of display light over those of the scene, cd/m², that make a faint tint on a grey of this
+/// luminance: the mean of both tints. For operators that keep greys grey.
 pub(super) fn tint_slope(fitted: &dyn FittedTone, pixel: Pixel, scene_cd_m2: f32) -> f32 {
     let grey = scene_cd_m2.clamp(1e-6, 1e30);
     let chroma = |rgb: [f32; 3]| {

@@ -17,9 +17,9 @@ use crate::display::Viewing;
 /// Makes brightness on the display equal to brightness in the scene, by Stevens and Stevens' power laws.
 ///
 /// Tumblin and Rushmeier, "Tone reproduction for realistic images", IEEE CG&A 13(6), 1993. Adaptation of the scene is
-/// the geometric mean of its pixels (a pixel's own would reverse contrast at edges, as [`AdaptationScope::Local`] does in
-/// part); that of the display is white / √(white / black). The display's black is subtracted, since the display adds it
-/// again.
+/// the geometric mean of its pixels (a pixel's own would reverse contrast at edges, as [`AdaptationScope::Local`]
+/// does in part); that of the display is white / √(white / black). The display's black is subtracted, since the
+/// display adds it again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TumblinRushmeier {
     /// Multiplies the result: 2^stops.

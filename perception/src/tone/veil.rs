@@ -61,8 +61,8 @@ impl CellCount {
 impl Veil {
     /// The veil of a picture; `None` where its range is too small to make one.
     ///
-    /// The picture's 1° cells (its foveal image) are weighted by Moon and Spencer's cos t / t² for the angle t between them,
-    /// written as cos t / (2 (1 − cos t)).
+    /// The picture's 1° cells (its foveal image) are weighted by Moon and Spencer's cos t / t² for the angle t
+    /// between them, written as cos t / (2 (1 − cos t)).
     pub(super) fn of(luminance_cd_m2: &Plane, density: PixelDensity) -> Option<Self> {
         let (width, height) = (luminance_cd_m2.width(), luminance_cd_m2.height());
         let CellCount { columns, rows } = CellCount::of(width, height, density);
@@ -173,8 +173,8 @@ mod tests {
         assert!(Veil::of(&Plane::filled(0, 0, 5.0), PixelDensity::square(10.0)).is_none());
     }
 
-    /// Whatever is left over when a picture is cut into degrees: a lamp veils as much at its right and lower borders as at the
-    /// left and upper ones.
+    /// Whatever is left over when a picture is cut into degrees: a lamp veils as much at its right and lower borders
+    /// as at the left and upper ones.
     #[test]
     fn a_mirrored_picture_has_the_mirrored_veil() {
         const WIDTH: usize = 130;

@@ -30,9 +30,9 @@ use adjustment::{Adjustment, DisplayRange, Histogram};
 /// contrast than there is (or than can be seen, with [`Ceiling::Human`]).
 ///
 /// "A visibility matching tone reproduction operator for high dynamic range scenes", IEEE TVCG 3(4), 1997; details as
-/// Radiance's `pcond` has them. The histogram is that of foveal samples: means over a Gaussian as wide as a disc of 1°,
-/// eight a degree. Luminances outside the samples' range are shown as the range's ends. With effects, as `pcond -v -a -c`:
-/// glare before, acuity and colour after. It adapts to the picture and not over time.
+/// Radiance's `pcond` has them. The histogram is that of foveal samples: means over a Gaussian as wide as a disc of
+/// 1°, eight a degree. Luminances outside the samples' range are shown as the range's ends. With effects, as `pcond
+/// -v -a -c`: glare before, acuity and colour after. It adapts to the picture and not over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WardLarson97 {
     /// Multiplies the result: 2^stops.

@@ -4,7 +4,8 @@ use crate::mesh::Part;
 use crate::noise::gradient;
 use std::f64::consts::TAU;
 
-/// A table top 1.8 m wide and 0.9 m deep with a rounded front edge at z = 0.45, and a tiled wall behind it at z = -0.45.
+/// A table top 1.8 m wide and 0.9 m deep with a rounded front edge at z = 0.45, and a tiled wall behind it at z =
+/// -0.45.
 pub(super) fn table() -> Vec<Part> {
     let (front, back, radius, thick) = (0.45, -0.45, 0.012, 0.05);
     let top = Part::surface("table-top", "table", (1, 1), [2.0, 1.0], |u, v| {

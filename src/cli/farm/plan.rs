@@ -25,8 +25,8 @@ pub(super) struct PlanArguments {
     /// Most units that a round of a frame is cut into: about as many processes as should work on one frame.
     #[arg(long, value_name = "P", default_value_t = 16, value_parser = whole(1..=100_000), allow_negative_numbers = true)]
     passes: u32,
-    /// Fewest samples of a unit. A unit should last ten seconds or more; a round with fewer samples is traced by the merge
-    /// that planned it.
+    /// Fewest samples of a unit. A unit should last ten seconds or more; a round with fewer samples is traced by the
+    /// merge that planned it.
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 4_000_000)]
     unit_samples: u64,
     /// Folder to make.
@@ -35,7 +35,8 @@ pub(super) struct PlanArguments {
     /// What finished frames become: exr with all layers, or png as the display shows it.
     #[arg(long, default_value = "exr", value_parser = picture_formats())]
     format: PictureFormat,
-    /// Keep the films of finished frames, for merge and for render --resume, which goes on with a frame of a shot as with a still.
+    /// Keep the films of finished frames, for merge and for render --resume, which goes on with a frame of a shot as
+    /// with a still.
     #[arg(long)]
     keep_films: bool,
     /// After --: options of render or, with --frames, of animate, such as --size 480x270 --visibility 2.

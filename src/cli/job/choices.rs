@@ -29,9 +29,11 @@ pub(in crate::cli) enum Quality {
 pub(super) enum SamplingChoice {
     /// Where the remaining error can be seen.
     Adaptive,
-    /// The same everywhere. Where --time or --plans end it on the way from one count to the next, some pixels have the next already.
+    /// The same everywhere. Where --time or --plans end it on the way from one count to the next, some pixels have
+    /// the next already.
     Uniform,
-    /// Another renderer's rule, for comparison: difference of two estimates over the square root of brightness (Cycles).
+    /// Another renderer's rule, for comparison: difference of two estimates over the square root of brightness
+    /// (Cycles).
     Relative,
     /// For comparison: relative standard error of each pixel.
     Variance,

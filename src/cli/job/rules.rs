@@ -64,7 +64,8 @@ pub(super) fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling
     }
 }
 
-/// The visibility to stop at: command line before scene before threshold. `None` where only other limits or rules end it.
+/// The visibility to stop at: command line before scene before threshold. `None` where only other limits or rules end
+/// it.
 pub(in crate::cli) fn visibility_limit(
     asked: Option<f64>,
     scene: &Scene,

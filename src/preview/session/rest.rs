@@ -1,7 +1,7 @@
 //! The picture at rest: what is shown of it is what was seen in a look at it as it is, and what would be saved.
 //!
-//! A look may take seconds, and a viewer who drags a slider asks for ten a second. So a change is shown at once without one, and the look
-//! follows when nothing more is asked for.
+//! A look may take seconds, and a viewer who drags a slider asks for ten a second. So a change is shown at once
+//! without one, and the look follows when nothing more is asked for.
 
 use super::Session;
 use super::live::Changed;
@@ -85,8 +85,9 @@ impl Session<'_> {
         }
     }
 
-    /// Why the picture rests from this look on; `None` where it does not. One that rested because nothing more could be seen, or done about
-    /// it, goes on where another target asks for more. For other eyes it stays as it is, and says no longer why it rests.
+    /// Why the picture rests from this look on; `None` where it does not. One that rested because nothing more could
+    /// be seen, or done about it, goes on where another target asks for more. For other eyes it stays as it is, and
+    /// says no longer why it rests.
     pub(super) fn reason_to_rest(&self, judgement: &Judgement) -> Option<StopReason> {
         use StopReason::{Interrupted, MaxSamples, Visibility};
         let Some(Unlooked { before, changed }) = self.rest_look.unlooked else { return Some(Interrupted) };

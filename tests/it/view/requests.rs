@@ -12,7 +12,8 @@ fn orbit() -> Value {
     json!({ "do": "camera", "by": "orbit", "right": 0.3, "up": 0.1 })
 }
 
-/// What is asked for while the camera moves is done to the picture that it moves to, once that has something everywhere.
+/// What is asked for while the camera moves is done to the picture that it moves to, once that has something
+/// everywhere.
 #[test]
 fn a_picture_in_motion_is_stopped_paused_and_saved_where_it_comes_to() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -44,7 +45,8 @@ fn a_picture_in_motion_is_stopped_paused_and_saved_where_it_comes_to() {
     }
 }
 
-/// A pause in the first pass does not make files of black pixels: that pass is traced to its end for a file, and the pause goes on.
+/// A pause in the first pass does not make files of black pixels: that pass is traced to its end for a file, and the
+/// pause goes on.
 #[test]
 fn a_picture_that_was_paused_early_is_saved_whole() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -89,8 +91,8 @@ fn a_picture_that_was_asked_for_is_saved_whatever_comes_then() {
     viewer.status("the picture", |_| picture.exists());
 }
 
-/// A camera with nothing before its middle turns about what else it sees, from the first movement on and right after it has come
-/// home; pbrt's pinholes have their focus a million units away.
+/// A camera with nothing before its middle turns about what else it sees, from the first movement on and right after
+/// it has come home; pbrt's pinholes have their focus a million units away.
 #[test]
 fn a_camera_that_looks_past_everything_stays_with_the_scene() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -228,7 +230,8 @@ fn focus_is_on_a_plane_and_outlives_an_edit() {
     assert_eq!(focus_distance(&edited), distance);
 }
 
-/// A picture that has reached its target goes on towards a lower one, and at rest says nothing that does not hold any more.
+/// A picture that has reached its target goes on towards a lower one, and at rest says nothing that does not hold any
+/// more.
 #[test]
 fn another_target_is_another_reason() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -43,8 +43,8 @@ fn a_step_gives_the_same_curve_at_any_frame_rate() {
     }
 }
 
-/// The goal goes evenly from one luminance to another within two seconds, or evenly in its logarithm (two or three decades:
-/// six in two seconds are 1.1 % apart); states of every twelfth of a second are compared.
+/// The goal goes evenly from one luminance to another within two seconds, or evenly in its logarithm (two or three
+/// decades: six in two seconds are 1.1 % apart); states of every twelfth of a second are compared.
 #[test]
 fn a_ramp_agrees_between_24_and_240_frames_a_second() {
     let even = [(0.01_f64, 1e4_f64), (1e4, 0.01), (10.0, 1000.0)].map(|(from, to)| (from, to, false));

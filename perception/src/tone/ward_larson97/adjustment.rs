@@ -22,7 +22,8 @@ const BINS: usize = 100;
 /// Share of the samples that a pass may trim to be the last, and that has to be left lest the picture is given up for a
 /// linear scale (`pcond`).
 const TOLERANCE: f64 = 0.025;
-/// Share of the samples that a last pass may cut: then at most a thousandth of the display's range (in logarithms) is not used.
+/// Share of the samples that a last pass may cut: then at most a thousandth of the display's range (in logarithms) is
+/// not used.
 const SETTLED: f64 = 1e-3;
 const MIN_CD_M2: f64 = 1e-4;
 /// Each pass trims more than the tolerance, so that there are at most ln(1 / 0.025) / 0.025 = 148.
@@ -76,8 +77,8 @@ impl Histogram {
         Some(Self { least, step, counts, mean: logs.iter().sum::<f64>() / logs.len() as f64 })
     }
 
-    /// Trims bins to their ceiling until hardly anything is trimmed. What then is left is the map; if hardly anything is
-    /// left, or the scene fits the display as it is, the map is a scale.
+    /// Trims bins to their ceiling until hardly anything is trimmed. What then is left is the map; if hardly anything
+    /// is left, or the scene fits the display as it is, the map is a scale.
     pub(super) fn adjust(mut self, range: DisplayRange, ceiling: Ceiling) -> Adjustment {
         let linear = Adjustment::Linear {
             scale: tvi::combined(range.middle_cd_m2()) / tvi::combined(self.mean.exp()),
@@ -121,10 +122,11 @@ impl Histogram {
         }
     }
 
-    /// Where the published passes stop, the last one has cut up to [`TOLERANCE`] of the samples, by which the rest would grow
-    /// above the ceiling it was just cut to. A few more passes make that less, as long as no more than that is lost in all;
-    /// what is left of it stays as light that the display has and the curve does not use. Returns the samples that stand
-    /// for all of the display's range: those before the last cut, so that every bin keeps to its ceiling.
+    /// Where the published passes stop, the last one has cut up to [`TOLERANCE`] of the samples, by which the rest
+    /// would grow above the ceiling it was just cut to. A few more passes make that less, as long as no more than
+    /// that is lost in all; what is left of it stays as light that the display has and the curve does not use.
+    /// Returns the samples that stand for all of the display's range: those before the last cut, so that every bin
+    /// keeps to its ceiling.
     fn settle(&mut self, range: DisplayRange, ceiling: Ceiling, last: &mut LastPass) -> f64 {
         let least = (1.0 - TOLERANCE) * (last.before - last.trimmed);
         while last.trimmed > SETTLED * last.before && last.passes < MAX_PASSES {

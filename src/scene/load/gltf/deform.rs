@@ -30,8 +30,8 @@ pub(super) fn morph(
     Ok(())
 }
 
-/// Moves every vertex with its joints; `joints` are world transforms times inverse bind matrices. The result is in world
-/// space.
+/// Moves every vertex with its joints; `joints` are world transforms times inverse bind matrices. The result is in
+/// world space.
 pub(super) fn skin(
     buffers: &Buffers,
     primitive: &gltf::Primitive,
