@@ -1,7 +1,7 @@
 """Do the documents hold what they promise?
 
     python3 docs/check.py                          # every relative link of every Markdown file leads to a file and, after #, to a heading,
-                                                   # and no paragraph or heading stands in a file twice
+                                                   # no paragraph or heading stands in a file twice, and no comment is too wide
     python3 docs/check.py target/release/fechner   # and every example of docs/commands.md runs, in a copy of the scenes: a minute and a half
 
 Nothing to install. Exit status 1 names what does not hold.
@@ -21,6 +21,8 @@ ROOT = pathlib.Path(__file__).parent.parent
 CODE = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
 # What `fechner view` would wait for is somebody who ends it.
 SECONDS_OF_A_VIEW = 6
+# Columns of a line: rustfmt.toml's max_width.
+WIDTH = 120
 
 
 def documents():
@@ -58,6 +60,15 @@ def repeated():
         for block, times in collections.Counter(titles + paragraphs).items():
             if times > 1:
                 yield f"{document.relative_to(ROOT)}: {block.splitlines()[0]}: stands there {times} times"
+
+
+def wide_comments():
+    """Comments of Rust that are wider than the code may be, which no formatter breaks; tables apart."""
+    listed = subprocess.run(["git", "ls-files", "*.rs"], cwd=ROOT, capture_output=True, text=True, check=True)
+    for name in listed.stdout.splitlines():
+        for number, line in enumerate((ROOT / name).read_text(encoding="utf-8").splitlines(), 1):
+            if len(line) > WIDTH and re.match(r"\s*//[/!]? (?!\|)", line):
+                yield f"{name}:{number}: a comment of {len(line)} columns; break it at {WIDTH}"
 
 
 def fields(figures):
@@ -109,7 +120,7 @@ def failing_examples(program):
 
 
 def main():
-    problems = [*broken_links(), *repeated()]
+    problems = [*broken_links(), *repeated(), *wide_comments()]
     if len(sys.argv) > 1:
         problems += failing_examples(sys.argv[1])
     print("\n".join(problems) or "the documents hold")

@@ -60,7 +60,8 @@ pub(crate) struct MaskSource<'a> {
     pub(crate) contrast: &'a Spectrum,
     /// The eye's sensitivity under the middle one of the picture's adaptation levels.
     pub(crate) sensitivity: Option<&'a RadialTable>,
-    /// [`ContrastSensitivity::transfer`]: what takes detail away before the eye takes it from masks, and from the guide's noise in them.
+    /// [`ContrastSensitivity::transfer`]: what takes detail away before the eye takes it from masks, and from the
+    /// guide's noise in them.
     pub(crate) csf: &'a dyn ContrastSensitivity,
     /// Variance of the guide's noise over the adaptation luminance squared, as far as it is known: at every second
     /// pixel, every fourth and so on, framed like any [`ReducedPlane`].
