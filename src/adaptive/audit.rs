@@ -10,7 +10,7 @@ mod unproven;
 pub use unproven::audit_unproven;
 
 use super::beginning;
-use super::judge::{JudgeError, Judgement, check_cancelled, variance_share};
+use super::judge::{JudgeError, Judgement, check_cancelled};
 use super::plan::blocks_between;
 use super::settings::LoopSettings;
 use crate::film::{BlockSum, Film, HalfPixel, Halves};
@@ -99,7 +99,7 @@ pub fn audit(
         // Fresh less kept has twice the variance of one of them.
         difference.values_mut()[pixel] = (nits * (again - kept) / std::f64::consts::SQRT_2) as f32;
         let per_sample = f64::from(judgement.met_per_sample.values()[pixel]);
-        variance.values_mut()[pixel] = (per_sample * variance_share(film, pixel)) as f32;
+        variance.values_mut()[pixel] = (per_sample * film.variance_share(pixel)) as f32;
     }
     let displayed = seen::display_half_difference(
         judgement.tone.as_ref(),
@@ -202,7 +202,7 @@ fn repetition(film: &Film, pixels: &[usize], times: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
     for &pixel in pixels {
         for half in Half::BOTH {
-            let wanted = film.half(half)[pixel].taken.saturating_mul(times);
+            let wanted = film.taken(pixel, half).saturating_mul(times);
             plan.blocks.extend(blocks_between(pixel as u32, half, 0, wanted));
         }
     }

@@ -50,7 +50,7 @@ pub(super) fn factor_of_bound(judgement: &Judgement, state: &RenderState, standa
     let [told, found] = judgement.energies_of([&told, &found]);
     let missed = found.combined(&told, |found, told| if (found - told).is_finite() { found - told } else { 0.0 });
     // Cubes of f32 end at 1e38.
-    let unit = missed.values().iter().fold(f32::MIN_POSITIVE, |most, missed| most.max(missed.abs()));
+    let unit = missed.map(f32::abs).max().max(f32::MIN_POSITIVE);
     let thresholds = &judgement.thresholds.in_bands;
     let scatter = thresholds.pooled_scatter(&missed.map(|missed| missed / unit));
     let [told, found] = [told, found].map(|energy| thresholds.pooled(&energy));

@@ -1,6 +1,6 @@
 //! What a plan will leave to be seen, without a look at what it will find.
 
-use super::judge::{Judgement, variance_share};
+use super::judge::Judgement;
 use super::stop::TOLERATED_SHARE;
 use crate::film::{Film, share_of_mean};
 use crate::integrator::SamplePlan;
@@ -24,7 +24,7 @@ impl<'a> Forecast<'a> {
     pub(super) fn of(film: &'a Film, judgement: &'a Judgement) -> Self {
         /// Beyond this the noise of a pixel's surroundings is another matter than its own.
         const RANGE: (f32, f32) = (0.5, 1.5);
-        let rough = judgement.rough_visibility_of(&variance(film, judgement, |pixel| variance_share(film, pixel)));
+        let rough = judgement.rough_visibility_of(&variance(film, judgement, |pixel| film.variance_share(pixel)));
         let smear = rough.combined(&judgement.predicted, |rough, predicted| {
             let ratio = rough / predicted;
             if ratio.is_finite() { ratio.clamp(RANGE.0, RANGE.1) } else { 1.0 }

@@ -125,7 +125,7 @@ fn gains(film: &Film, energies: &Energies) -> impl Fn(&BlockWork) -> f32 {
 
 /// Samples of a pixel if its other half had as many as this one.
 fn twice_taken(film: &Film, pixel: usize, half: Half) -> f64 {
-    2.0 * f64::from(film.half(half)[pixel].taken)
+    2.0 * f64::from(film.taken(pixel, half))
 }
 
 /// What one sample more than `samples` takes away of `energy` / `samples`, about.

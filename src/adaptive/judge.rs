@@ -5,7 +5,7 @@ mod over_white;
 mod per_sample;
 mod steps;
 
-pub use self::noise_on_display::{display_scale, variance_share, variance_shares};
+pub use self::noise_on_display::{display_scale, variance_shares};
 use self::over_white::OverWhite;
 use self::per_sample::{PerSample, Sources};
 pub use self::steps::Thresholds;

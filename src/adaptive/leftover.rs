@@ -91,13 +91,13 @@ impl Shown<'_> {
     }
 
     fn noise(&self, energies: &[f32], pixel: usize, half: Half) -> f32 {
-        let samples = self.film.half(half)[pixel].taken.max(1) as f32;
+        let samples = self.film.taken(pixel, half).max(1) as f32;
         // The order of `min` turns NaN into the most.
         (energies[pixel] / samples).min(MAX_ENERGY)
     }
 
     fn may_have_more(&self, pixel: usize, half: Half) -> bool {
-        doubled_blocks(pixel as u32, half, self.film.half(half)[pixel].taken, self.max_samples).next().is_some()
+        doubled_blocks(pixel as u32, half, self.film.taken(pixel, half), self.max_samples).next().is_some()
     }
 
     /// How far each place is above the rung, squared.

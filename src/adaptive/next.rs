@@ -10,7 +10,7 @@ use super::plan::{
     SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, plan_up_to, uniform_plan, wanted_samples,
 };
 use super::rivals::{rival_plan, rival_stop};
-use super::settings::{LoopSettings, Sampling, THRESHOLD};
+use super::settings::{LoopSettings, RivalRule, Sampling, THRESHOLD};
 use super::small_things::samples_to_meet;
 use super::state::Exposure;
 use super::stop::{MIN_SAVING, predicted_saving};
@@ -42,25 +42,38 @@ enum AuditOutcome {
 impl Loop<'_> {
     /// Decides what comes next, leaving rungs of the ladder that are reached. An audit may make `judgement` stricter.
     pub(super) fn next_step(&mut self, judgement: &mut Judgement) -> Result<Step, JudgeError> {
-        let limits = &self.settings.limits;
         let left = self.left_of_budget();
-        if left == 0 {
-            let is_there = self.settings.sampling.is_by_sight() && is_reached(judgement, limits.last_rung());
-            return Ok(Step::Stop(if is_there { StopReason::Visibility } else { StopReason::Samples }));
+        match self.settings.sampling {
+            _ if left == 0 => Ok(Step::Stop(self.reason_of_a_spent_budget(judgement))),
+            Sampling::Rival(rule) => Ok(self.rival_step(rule, judgement, left)),
+            Sampling::Adaptive | Sampling::Uniform => self.ladder_step(judgement, left),
         }
-        if let Sampling::Rival(rule) = self.settings.sampling {
-            let exposure = self.exposure(judgement);
-            let plan = rival_plan(rule, &self.state.film, exposure, left, limits.max_samples);
-            return Ok(if plan.blocks.is_empty() {
-                Step::Stop(rival_stop(rule, &self.state.film, exposure, left))
-            } else {
-                Step::Trace(plan)
-            });
+    }
+
+    /// The last sample may have reached what was asked for.
+    fn reason_of_a_spent_budget(&self, judgement: &Judgement) -> StopReason {
+        let LoopSettings { sampling, limits, .. } = self.settings;
+        let is_there = sampling.is_by_sight() && is_reached(judgement, limits.last_rung());
+        if is_there { StopReason::Visibility } else { StopReason::Samples }
+    }
+
+    /// What another renderer's rule does next, with so many samples left of the budget.
+    fn rival_step(&mut self, rule: RivalRule, judgement: &Judgement, left: u64) -> Step {
+        let exposure = self.exposure(judgement);
+        let plan = rival_plan(rule, &self.state.film, exposure, left, self.settings.limits.max_samples);
+        if plan.blocks.is_empty() {
+            Step::Stop(rival_stop(rule, &self.state.film, exposure, left))
+        } else {
+            Step::Trace(plan)
         }
+    }
+
+    /// More samples for the first rung that is not reached, within the budget; without any, why the render ends.
+    fn ladder_step(&mut self, judgement: &mut Judgement, left: u64) -> Result<Step, JudgeError> {
         // Less than a sample a pixel is as good as spent.
         let pixels = self.state.film.pixel_count() as u64;
         let mut is_spent = left < pixels;
-        let target = limits.last_rung();
+        let target = self.settings.limits.last_rung();
         if self.rungs.is_empty() && !is_reached(judgement, target) {
             // A film that came to the end of its ladder, and does not look like it.
             self.rungs.push_back(target);
@@ -87,21 +100,29 @@ impl Loop<'_> {
         }))
     }
 
-    /// Queues a plan that takes no look, where there is one; false when it is time for a look. Such plans are for lamps
-    /// that are known to be there, for what is left of a budget where that is hardly more than a look costs, and, by
-    /// raw noise alone, between two looks at a picture that is denoised.
+    /// Queues a plan that takes no look, where there is one; false when it is time for a look.
     pub(super) fn plans_without_a_look(&mut self) -> Result<bool, JudgeError> {
         let left = self.left_of_budget();
-        if let Some(plan) = self.plan_to_meet_lamps(left) {
-            self.queue(plan);
-            return Ok(true);
-        }
-        if self.has_little_left_after_its_first_samples(left) {
-            self.queue(even_plan(&self.state.film, left, self.settings.limits.max_samples));
-            return Ok(true);
-        }
+        let plan = match self.plan_before_a_look(left) {
+            Some(plan) => Some(plan),
+            None => self.plan_between_looks(left)?,
+        };
+        Ok(plan.map(|plan| self.queue(plan)).is_some())
+    }
+
+    /// Samples for lamps that are known to be there, and what is left of a budget where that is hardly more than a look
+    /// costs.
+    fn plan_before_a_look(&self, left: u64) -> Option<SamplePlan> {
+        self.plan_to_meet_lamps(left).or_else(|| {
+            let even = || even_plan(&self.state.film, left, self.settings.limits.max_samples);
+            self.has_little_left_after_its_first_samples(left).then(even)
+        })
+    }
+
+    /// Samples by raw noise alone, between two looks at a picture that is denoised.
+    fn plan_between_looks(&mut self, left: u64) -> Result<Option<SamplePlan>, JudgeError> {
         if self.settings.denoiser.is_none() || !self.settings.sampling.is_by_sight() || left == 0 {
-            return Ok(false);
+            return Ok(None);
         }
         let started = Instant::now();
         let (film, doubled) = (&self.state.film, self.doubled());
@@ -109,24 +130,17 @@ impl Loop<'_> {
         let until_look = self.state.until_look.get_or_insert_with(|| UntilLook::first(film));
         let may_look = until_look.may_look(film);
         let plan = if self.settings.sampling == Sampling::Uniform {
-            if may_look {
-                return Ok(false);
-            }
-            uniform_plan(film, doubled)
+            if may_look { SamplePlan::default() } else { uniform_plan(film, doubled) }
         } else {
             let raw = judge_raw(film, self.settings)?;
             if may_look && until_look.must_look(film, &raw, rung) {
-                self.state.seconds.perception += started.elapsed().as_secs_f64();
-                return Ok(false);
+                SamplePlan::default()
+            } else {
+                cut(until_look.plan(film, &raw, self.settings.limits.max_samples, left), film, &raw, left)
             }
-            cut(until_look.plan(film, &raw, self.settings.limits.max_samples, left), film, &raw, left)
         };
         self.state.seconds.perception += started.elapsed().as_secs_f64();
-        if plan.blocks.is_empty() {
-            return Ok(false);
-        }
-        self.queue(plan);
-        Ok(true)
+        Ok(plan.non_empty())
     }
 
     /// Samples that pixels should have to meet lamps smaller than they, for adaptive sampling.

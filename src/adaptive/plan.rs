@@ -51,7 +51,7 @@ pub fn pilot_plan(film: &Film, most_samples: u32) -> SamplePlan {
         for half in Half::BOTH {
             let to = to.min(share_of_half(samples, half));
             for pixel in 0..film.pixel_count() as u32 {
-                let first = film.half(half)[pixel as usize].taken.max(from);
+                let first = film.taken(pixel as usize, half).max(from);
                 if first < to {
                     plan.blocks.push(BlockWork { first, samples: to - first, ..BlockWork::whole(pixel, half, 0) });
                 }
@@ -66,7 +66,7 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
     for pixel in 0..film.pixel_count() as u32 {
         for half in Half::BOTH {
-            let taken = film.half(half)[pixel as usize].taken;
+            let taken = film.taken(pixel as usize, half);
             plan.blocks.extend(blocks_between(pixel, half, taken, share_of_half(mean_samples, half)).next());
         }
     }
@@ -81,7 +81,7 @@ pub(super) fn even_plan(film: &Film, samples: u64, max_samples: u32) -> SamplePl
         let mut plan = SamplePlan::default();
         for pixel in 0..film.pixel_count() as u32 {
             for half in Half::BOTH {
-                let taken = film.half(half)[pixel as usize].taken;
+                let taken = film.taken(pixel as usize, half);
                 let [from, to] = [range.start, range.end].map(|more| taken.saturating_add(share_of_half(more, half)));
                 plan.blocks.extend(blocks_between(pixel, half, from, to.min(share_of_half(max_samples, half))));
             }
@@ -100,7 +100,7 @@ pub(super) fn plan_up_to(film: &Film, wanted_samples: impl Fn(usize) -> u32) -> 
     for pixel in 0..film.pixel_count() {
         let wanted_samples = wanted_samples(pixel);
         for half in Half::BOTH {
-            let taken = film.half(half)[pixel].taken;
+            let taken = film.taken(pixel, half);
             plan.blocks.extend(blocks_between(pixel as u32, half, taken, share_of_half(wanted_samples, half)));
         }
     }
@@ -230,7 +230,7 @@ fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own:
     // 0.50 % of the energy, two 0.24 %, any 0.14 % (each ± 0.12), on a caustic two cost 0.32 %, any 0.27 % (± 0.06),
     // for level samples (`benches/results/energy.md`).
     Half::BOTH.map(|half| {
-        let taken = film.half(half)[pixel].taken.max(1);
+        let taken = film.taken(pixel, half).max(1);
         let harder = if pooled > 0.0 { f64::from(own[half.index()] / pooled).max(1.0).sqrt() } else { 1.0 };
         let need = 0.5 * f64::from(wanted) * harder * confidence_margin(f64::from(taken));
         doublings_for(haste.margin * need / f64::from(taken), dither(film.width(), pixel), haste.most_doublings)
@@ -264,7 +264,7 @@ pub(super) fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(us
     let of_pixel = |pixel: usize| {
         let doublings = doublings(pixel);
         Half::BOTH.into_iter().flat_map(move |half| {
-            let taken = film.half(half)[pixel].taken;
+            let taken = film.taken(pixel, half);
             doubled_blocks(pixel as u32, half, taken, max_samples).take(doublings[half.index()] as usize)
         })
     };

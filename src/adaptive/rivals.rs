@@ -56,7 +56,7 @@ pub fn rival_stop(rule: RivalRule, film: &Film, exposure: f64, left: u64) -> Sto
 /// Takes `samples` of a pixel, half of them in each half, through as many doublings as they reach.
 fn push_samples(plan: &mut SamplePlan, film: &Film, pixel: usize, samples: u32) {
     for half in Half::BOTH {
-        let taken = film.half(half)[pixel].taken;
+        let taken = film.taken(pixel, half);
         let wanted = taken.saturating_add(share_of_half(samples, half));
         plan.blocks.extend(blocks_between(pixel as u32, half, taken, wanted));
     }

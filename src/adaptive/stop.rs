@@ -43,10 +43,9 @@ pub fn is_reached(judgement: &Judgement, rung: f64) -> bool {
     if rung <= 0.0 {
         return false;
     }
-    let worst = judgement.predicted.values().iter().fold(0.0, |a: f32, &v| a.max(v));
     judgement.is_known
         && visible_share(judgement, rung) <= TOLERATED_SHARE
-        && f64::from(worst) <= TOLERATED_WORST * rung
+        && f64::from(judgement.predicted.max()) <= TOLERATED_WORST * rung
 }
 
 /// Share of samples that the wanted counts save against as many everywhere as the hardest tolerated pixel needs.
@@ -65,6 +64,5 @@ pub(super) fn predicted_saving(film: &Film, judgement: &Judgement, wanted: &Plan
 
 /// Share of pixels whose predicted visibility is above `visibility`.
 pub fn visible_share(judgement: &Judgement, visibility: f64) -> f64 {
-    let values = judgement.predicted.values();
-    values.iter().filter(|&&v| f64::from(v) > visibility).count() as f64 / values.len() as f64
+    judgement.predicted.share_above(visibility)
 }

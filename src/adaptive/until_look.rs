@@ -119,7 +119,7 @@ impl UntilLook {
 fn to_blame(judgement: &Judgement, visibility: f64) -> Vec<bool> {
     let above = judgement.predicted.map(|predicted| f32::from(f64::from(predicted) > visibility));
     let shares = judgement.thresholds.in_bands.pooled(&above);
-    let most = shares.values().iter().fold(0.0, |a: f32, &share| a.max(share));
+    let most = shares.max();
     let is_to_blame = |(&above, &share): (&f32, &f32)| above > 0.0 || share > MIN_BLAME * most;
     above.values().iter().zip(shares.values()).map(is_to_blame).collect()
 }

@@ -236,6 +236,16 @@ impl Film {
         self.halves.iter().map(|half| &half[pixel]).all(|half| half.missed == half.samples && half.mean == [0.0; 3])
     }
 
+    /// Samples that one half of a pixel was asked for, finite or not: where its sequence goes on.
+    pub fn taken(&self, pixel: usize, half: Half) -> u32 {
+        self.half(half)[pixel].taken
+    }
+
+    /// Variance of a pixel's mean over that of one sample: [`share_of_mean`].
+    pub fn variance_share(&self, pixel: usize) -> f64 {
+        share_of_mean(Half::BOTH.map(|half| self.half(half)[pixel].samples))
+    }
+
     /// Samples of a pixel in both halves.
     pub fn samples(&self, pixel: usize) -> u32 {
         self.halves[0][pixel].samples + self.halves[1][pixel].samples

@@ -28,7 +28,7 @@ impl Composed {
     pub(super) fn of_film(film: &Film, nits_per_unit: f64, stage: Stage) -> Self {
         // While a pixel's pilot is traced one half is ahead of the other, and their samples count alike.
         let is_in_pilot =
-            |pixel: usize| Half::BOTH.iter().all(|&half| film.half(half)[pixel].taken <= PILOT_SAMPLES_PER_HALF);
+            |pixel: usize| Half::BOTH.iter().all(|&half| film.taken(pixel, half) <= PILOT_SAMPLES_PER_HALF);
         let light = |pixel: usize| {
             let light = match stage {
                 Stage::UnderWay if is_in_pilot(pixel) => Film::mean_of_samples_cd_m2,

@@ -2,22 +2,16 @@
 
 use super::super::settings::LoopSettings;
 use super::super::statistics::{DifferenceOnDisplay, MAX_FACTOR, by_channel};
-use crate::film::{CHANNELS, Film, Halves, share_of_mean};
-use crate::sampler::Half;
+use crate::film::{CHANNELS, Film, Halves};
 use fechner_perception::opponent::Opponent;
 use fechner_perception::seen::{self, NoiseShown, SceneColours};
 use fechner_perception::tone::{FittedTone, Pixel, SceneLight};
 use fechner_perception::{PIXELS_PER_TASK, Plane};
 use rayon::prelude::*;
 
-/// Variance of a pixel's mean over that of one sample: [`share_of_mean`].
-pub fn variance_share(film: &Film, pixel: usize) -> f64 {
-    share_of_mean(Half::BOTH.map(|half| film.half(half)[pixel].samples))
-}
-
-/// Variance of each pixel's mean over that of one sample: [`variance_share`] of every pixel.
+/// Variance of each pixel's mean over that of one sample: [`Film::variance_share`].
 pub fn variance_shares(film: &Film) -> Plane {
-    film.plane(|pixel| variance_share(film, pixel) as f32)
+    film.plane(|pixel| film.variance_share(pixel) as f32)
 }
 
 /// What the display makes of noise.
@@ -118,7 +112,7 @@ pub(super) fn difference_on_display(
 ) -> DifferenceOnDisplay {
     // A half's variance, which is twice the mean's; of a half without samples nothing differs.
     let of_halves = film.plane(|pixel| match film.halves(pixel) {
-        Halves::Both(_) => 2.0 * variance_share(film, pixel) as f32,
+        Halves::Both(_) => 2.0 * film.variance_share(pixel) as f32,
         Halves::Only(_) => 0.0,
     });
     let noise = NoiseOnDisplay { shares: &of_halves, colours, tone, settings, inflation: 1.0 };

@@ -8,7 +8,7 @@
 
 use super::super::settings::LoopSettings;
 use super::steps::{Guide, Scatter, Thresholds, found_thresholds};
-use super::{JudgeError, LookFor, variance_share, without_noise};
+use super::{JudgeError, LookFor, without_noise};
 use crate::film::Film;
 use fechner_perception::Plane;
 use fechner_perception::tone::FittedTone;
@@ -122,7 +122,7 @@ fn guide_coverage(film: &Film) -> Plane {
     let coverage = film.coverage();
     let variance = film.plane(|pixel| {
         let covered = f64::from(coverage[pixel]);
-        (covered * (1.0 - covered) * variance_share(film, pixel)) as f32
+        (covered * (1.0 - covered) * film.variance_share(pixel)) as f32
     });
     let rgb: Vec<[f32; 3]> = coverage.iter().map(|&covered| [covered; 3]).collect();
     // Coverage is no light that falls on a surface.
