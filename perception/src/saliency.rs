@@ -4,6 +4,9 @@
 //! 1998: centre–surround differences of intensity, opponent colour and orientation over a pyramid; and of motion, as
 //! Yee, Pattanaik and Greenberg added in 2001.
 //!
+//! The paper's colour maps are doubly opponent, |(R − G)(centre) + (R − G)(surround)|, and stand out where centre and
+//! surround are of one colour. Here the surround is subtracted, as it is of intensity: what differs stands out.
+//!
 //! It is of what draws the eye by itself, and knows no task, no faces and no text. Not for thresholds of stills:
 //! attention decides what moving things the eye follows ([`crate::motion`]), and changes nothing where nothing moves.
 
