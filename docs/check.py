@@ -64,8 +64,8 @@ def repeated():
 
 def wide_comments():
     """Comments of Rust that are wider than the code may be, which no formatter breaks; tables apart."""
-    listed = subprocess.run(["git", "ls-files", "*.rs"], cwd=ROOT, capture_output=True, text=True, check=True)
-    for name in listed.stdout.splitlines():
+    listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "*.rs"], cwd=ROOT, capture_output=True, text=True, check=True)
+    for name in filter(lambda name: (ROOT / name).exists(), listed.stdout.splitlines()):
         for number, line in enumerate((ROOT / name).read_text(encoding="utf-8").splitlines(), 1):
             if len(line) > WIDTH and re.match(r"\s*//[/!]? (?!\|)", line):
                 yield f"{name}:{number}: a comment of {len(line)} columns; break it at {WIDTH}"

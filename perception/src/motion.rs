@@ -64,7 +64,7 @@ impl ErrorMotion {
 }
 
 /// Speed over the picture, deg/s, of motion in pixels a frame, on a flat display of these frames a second and pixels
-/// a degree whose middle is that of the picture ([`FlatDisplay`]).
+/// a degree whose middle is that of the picture ([`FlatDisplay`]): a part of a picture counts as one of its own.
 ///
 /// Each pixel takes the slowest speed of its 3×3 neighbourhood: at a silhouette the slower side's error is the one that
 /// could be seen. Motion that is not finite counts as none.

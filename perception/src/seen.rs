@@ -288,6 +288,63 @@ mod tests {
         Plane::filled(1, 1, value)
     }
 
+    /// An operator of which nobody knows that it multiplies by one number.
+    #[derive(Debug)]
+    struct Unknown(Box<dyn FittedTone>);
+
+    impl FittedTone for Unknown {
+        fn relative_luminance_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+            self.0.relative_luminance_at(pixel, scene_cd_m2)
+        }
+
+        fn describe(&self) -> String {
+            self.0.describe()
+        }
+
+        fn save(&self) -> crate::tone::SavedTone {
+            self.0.save()
+        }
+    }
+
+    /// From noise that few samples bring to normal noise, up to white, of greys and of colours that reach it earlier:
+    /// what is told at once is what all points tell, and most of it is told at once.
+    #[test]
+    fn noise_within_the_display_is_told_as_by_all_points() {
+        let display = Display { white_cd_m2: 200.0, black_cd_m2: 0.2, ..Display::default() };
+        let (known, unknown) = (absolute(&display), Unknown(absolute(&display)));
+        let (at_once, by_points) = (NoiseShown::new(&*known, &display), NoiseShown::new(&unknown, &display));
+        let pixel = Pixel { x: 0, y: 0 };
+        let (mut told_at_once, mut all) = (0, 0);
+        for mean in [0.5, 5.0, 40.0, 100.0, 150.0, 190.0, 230.0] {
+            for deviation in [0.02, 0.2, 0.5, 0.7, 1.5] {
+                for rgb in [[1.0; 3], [1.0, 0.2, 0.1], [0.1, 0.2, 4.0]] {
+                    for tints in [0.0, 4.0, 4e3] {
+                        let colour = SceneColour { rgb, chromatic_slope: 1.0 };
+                        let luminance = (deviation * mean) * (deviation * mean);
+                        let scene = [luminance, tints, 0.5 * tints];
+                        let noise = Noise { mean: f64::from(mean), variance: f64::from(luminance) };
+                        let is_at_once = at_once
+                            .shown
+                            .variance_within_display(noise, rgb, [tints, 0.5 * tints], at_once.rooms_cd_m2)
+                            .is_some();
+                        told_at_once += usize::from(is_at_once);
+                        all += 1;
+                        let [one, other] =
+                            [&at_once, &by_points].map(|shown| shown.opponent_variances(pixel, mean, colour, scene));
+                        for (one, other) in one.into_iter().zip(other) {
+                            let least = one.max(other).max(1e-6);
+                            assert!(
+                                (one - other).abs() < 1e-3 * least,
+                                "{mean}, {deviation}, {rgb:?}, {tints}: {one}, {other}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+        assert!(3 * told_at_once > all, "{told_at_once} of {all}");
+    }
+
     #[test]
     fn a_linear_operator_keeps_the_variance() {
         let display = Display::default();

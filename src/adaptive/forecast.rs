@@ -32,14 +32,16 @@ impl<'a> Forecast<'a> {
         Self { film, judgement, smear }
     }
 
-    /// Factor on the visibility that the allocation may leave at each pixel: that of thresholds, and what the bands'
+    /// Factor on the visibility that the allocation may leave at each pixel: importance, a bound, and what the bands'
     /// smear makes of the noise around it, which the allocation's constraints leave out. A dark strip beside bright
     /// noise sees more of it than the strip's own.
     pub(super) fn tolerance(&self) -> Plane {
-        match &self.judgement.threshold_factor {
-            None => self.smear.clone(),
-            Some(map) => self.smear.combined(map, |smear, factor| smear * factor),
-        }
+        let of_map = |smear: Plane, map: Option<&Plane>, times: fn(f32, f32) -> f32| match map {
+            None => smear,
+            Some(map) => smear.combined(map, times),
+        };
+        let important = of_map(self.smear.clone(), self.judgement.importance.as_ref(), |smear, factor| smear * factor);
+        of_map(important, self.judgement.bound_factor.as_ref(), |smear, factor| smear / factor)
     }
 
     /// Whether the plan will bring the picture to a visibility, if nothing new is found.
@@ -104,7 +106,7 @@ mod tests {
         let (amid, beside) = (column(12), column(60));
         assert!((amid - 1.0).abs() < 0.01, "amid noise {amid}");
         assert!((0.9..0.98).contains(&beside), "beside it {beside}");
-        judgement.threshold_factor = Some(Plane::filled(64, 64, 0.5));
+        judgement.importance = Some(Plane::filled(64, 64, 0.5));
         judgement.predicted = judgement.predicted.map(|visibility| visibility / 0.5);
         let of_half = Forecast::of(&film, &judgement).tolerance();
         assert!((of_half.get(12, 30) / tolerance.get(12, 30) - 0.5).abs() < 1e-6);

@@ -5,15 +5,16 @@ mod over_white;
 mod per_sample;
 mod steps;
 
+use self::noise_on_display::squared_differences;
 pub use self::noise_on_display::{display_scale, variance_shares};
 use self::over_white::OverWhite;
 use self::per_sample::{PerSample, Sources};
 pub use self::steps::Thresholds;
-use self::steps::{Guide, Scatter, found_thresholds, thresholds_of_still};
+use self::steps::{Guide, Scatter, chromatic_gains, found_thresholds, thresholds_of_still};
 use super::denoised::{DenoisedPicture, DenoisedThresholds, TimedDenoising};
 use super::settings::LoopSettings;
 use crate::denoise::{Denoiser, OidnError};
-use crate::film::{Estimate, Film};
+use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::denoised::DenoisedError;
@@ -41,10 +42,12 @@ pub struct Judgement {
     pub tone: Box<dyn FittedTone>,
     /// What can be seen where.
     pub thresholds: Thresholds,
-    /// What thresholds are multiplied by: [`LoopSettings::importance`], over what makes an upper bound of the
-    /// estimate where one is asked for. `thresholds` are without it; what a judgement's methods say, and `predicted`,
-    /// is with it.
-    pub threshold_factor: Option<Plane>,
+    /// What [`LoopSettings::importance`] multiplies thresholds by. `thresholds` are without it; what a judgement's
+    /// methods say, and `predicted`, is with it.
+    pub importance: Option<Plane>,
+    /// How many times the estimate the upper bound is that `predicted` holds, at least 1, where one is asked for. What
+    /// the loop goes by is with it, what may be seen of thresholds and of the halves' difference is not.
+    pub bound_factor: Option<Plane>,
     /// Whether the film has samples enough to tell what can be seen: [`Film::has_both_halves`].
     pub is_known: bool,
     /// Visibility that the variance predicts; infinite everywhere where it is not known.
@@ -206,7 +209,8 @@ impl Look<'_> {
             seconds_denoising,
             tone,
             thresholds,
-            threshold_factor: settings.importance.clone(),
+            importance: settings.importance.clone(),
+            bound_factor: None,
             is_known: film.has_both_halves(),
             predicted,
             pooled_variance_per_sample: pooled,
@@ -252,7 +256,7 @@ impl Look<'_> {
         };
         // An infinite variance, pooled with others, is NaN.
         let of_error = of_error.map(|v| if v.is_nan() { f32::INFINITY } else { v });
-        divided(of_error, self.settings.importance.as_ref())
+        per_importance(of_error, self.settings.importance.as_ref())
     }
 }
 
@@ -264,9 +268,9 @@ fn worse_of(visibility: Plane, other: Option<&Plane>) -> Plane {
     }
 }
 
-/// A visibility under thresholds that are multiplied.
-fn divided(visibility: Plane, threshold_factor: Option<&Plane>) -> Plane {
-    match threshold_factor {
+/// A visibility under thresholds that importance multiplies.
+fn per_importance(visibility: Plane, importance: Option<&Plane>) -> Plane {
+    match importance {
         None => visibility,
         Some(map) => visibility.combined(map, |visibility, factor| visibility / factor),
     }
@@ -284,18 +288,26 @@ impl Judgement {
         self.denoised.as_ref().map_or(&self.estimate.rgb_cd_m2, |denoised| &denoised.rgb_cd_m2)
     }
 
-    /// What can be seen of the denoised picture's error, under the thresholds of `predicted`. `None` for raw pictures.
+    /// What can be seen of the denoised picture's error, by importance as `predicted` is. `None` for raw pictures.
     pub fn denoised_error(&self) -> Option<Cow<'_, DenoisedError>> {
         let error = &self.denoised.as_ref()?.error;
-        Some(match &self.threshold_factor {
+        Some(match &self.importance {
             None => Cow::Borrowed(error),
             Some(map) => Cow::Owned(error.with_thresholds_times(map)),
         })
     }
 
-    /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)².
+    /// What is predicted, as an estimate and no bound.
+    pub fn estimated(&self) -> Cow<'_, Plane> {
+        match &self.bound_factor {
+            None => Cow::Borrowed(&self.predicted),
+            Some(factor) => Cow::Owned(self.predicted.combined(factor, |bound, factor| bound / factor)),
+        }
+    }
+
+    /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)², as far as `predicted` is bounded.
     pub fn visibility_of(&self, display_variance: &Plane) -> Plane {
-        self.under_thresholds(self.thresholds.visibility(display_variance))
+        self.bounded(self.per_importance(self.thresholds.visibility(display_variance)))
     }
 
     /// The same with each pixel's noise judged where it is, before the bands smear it: what the allocation's
@@ -312,58 +324,85 @@ impl Judgement {
 
     /// The same of several.
     pub(super) fn energies_of<const N: usize>(&self, display_variances: [&Plane; N]) -> [Plane; N] {
-        let allowed = self.allowed_standard_error_cd_m2();
+        let allowed = self.decisive_standard_error_cd_m2();
         display_variances.map(|plane| plane.combined(&allowed, |variance, allowed| variance / (allowed * allowed)))
     }
 
     /// Standard error of a pixel, cd/m² on the display, that is at visibility 1 by the model that drives the loop.
     pub fn allowed_standard_error_cd_m2(&self) -> Plane {
         let allowed = self.thresholds.limits();
-        match &self.threshold_factor {
+        match &self.importance {
             None => allowed,
             Some(map) => allowed.combined(map, |allowed, factor| allowed * factor),
         }
     }
 
-    fn under_thresholds(&self, visibility: Plane) -> Plane {
-        divided(visibility, self.threshold_factor.as_ref())
+    /// The same standard error, cd/m², less what a bound asks for: what counts are found by.
+    pub(super) fn decisive_standard_error_cd_m2(&self) -> Plane {
+        let allowed = self.allowed_standard_error_cd_m2();
+        match &self.bound_factor {
+            None => allowed,
+            Some(factor) => allowed.combined(factor, |allowed, factor| allowed / factor),
+        }
     }
 
-    /// Everything visible is so many times as visible, at least 1, from here on: thresholds are divided by it.
-    pub(super) fn raise(&mut self, factor: &Plane) {
-        self.predicted = self.predicted.combined(factor, |visibility, factor| visibility * factor);
-        self.threshold_factor = Some(match &self.threshold_factor {
-            None => factor.map(f32::recip),
-            Some(map) => map.combined(factor, |threshold, factor| threshold / factor),
-        });
-        self.measured = OnceLock::new();
+    fn per_importance(&self, visibility: Plane) -> Plane {
+        per_importance(visibility, self.importance.as_ref())
     }
 
-    /// Half of what the halves differ by on the display, cd/m²; the denoised halves where the picture is denoised.
-    pub(super) fn displayed_half_difference(&self) -> Plane {
-        let raw = || {
-            seen::display_half_difference(
-                self.tone.as_ref(),
-                &self.thresholds.in_bands.viewing().display,
-                &self.estimate.luminance_cd_m2,
-                &self.estimate.half_difference,
-            )
+    fn bounded(&self, visibility: Plane) -> Plane {
+        match &self.bound_factor {
+            None => visibility,
+            Some(factor) => visibility.combined(factor, |visibility, factor| visibility * factor),
+        }
+    }
+
+    /// Makes upper bounds of what is predicted: so many times as visible, at least 1.
+    pub(super) fn raise(&mut self, factor: Plane) {
+        self.predicted = self.predicted.combined(&factor, |visibility, factor| visibility * factor);
+        self.bound_factor = Some(factor);
+    }
+
+    /// Squared half of what the halves differ by on the display, (cd/m²)², by channel: each as the luminance variance
+    /// that shows as much.
+    ///
+    /// # Errors
+    /// If the perception model refuses the judgement's maps, which would be a defect of ours.
+    pub(super) fn found_by_channel(&self, film: &Film, settings: &LoopSettings) -> Result<Vec<Plane>, JudgeError> {
+        let thresholds = &self.thresholds.in_bands;
+        let squared = squared_differences(film, self.predicted.width(), self.tone.as_ref(), settings);
+        let Some(gains) = chromatic_gains(thresholds, settings)? else {
+            let [luminance, ..] = squared;
+            return Ok(vec![luminance]);
         };
-        self.denoised.as_ref().map_or_else(raw, |denoised| denoised.half_difference.clone())
+        let none = Plane::filled(self.predicted.width(), self.predicted.height(), 0.0);
+        let alone = |channel: usize| {
+            let planes = std::array::from_fn(|c| if c == channel { &squared[c] } else { &none });
+            thresholds.luminance_equivalent_variance(&gains, planes)
+        };
+        Ok((0..CHANNELS).map(alone).collect())
     }
 
     /// What can be seen of the halves' luminance difference: the same as predicted, measured; of the denoised halves
     /// where the picture is denoised.
     pub fn measured_error(&self) -> &MeasuredError {
         self.measured.get_or_init(|| {
-            let displayed = self.displayed_half_difference();
+            let raw = || {
+                seen::display_half_difference(
+                    self.tone.as_ref(),
+                    &self.thresholds.in_bands.viewing().display,
+                    &self.estimate.luminance_cd_m2,
+                    &self.estimate.half_difference,
+                )
+            };
+            let displayed = self.denoised.as_ref().map_or_else(raw, |denoised| denoised.half_difference.clone());
             let MeasuredError { visibility, amplitude } = match &self.over_white {
                 Some(over_white) => {
                     over_white.worse_error(self.thresholds.in_bands.measured_error(&displayed), &displayed)
                 }
                 None => self.thresholds.in_bands.measured_error(&displayed),
             };
-            MeasuredError { visibility: self.under_thresholds(visibility), amplitude: self.under_thresholds(amplitude) }
+            MeasuredError { visibility: self.per_importance(visibility), amplitude: self.per_importance(amplitude) }
         })
     }
 }

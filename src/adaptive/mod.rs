@@ -118,8 +118,8 @@ fn look_at(state: &RenderState, settings: &LoopSettings, look_for: LookFor) -> R
     let mut judgement = judge_for(look_for, &state.film, settings, state.inflation)?;
     if let Some(confidence) = settings.limits.confidence {
         let standard_errors = standard_errors(confidence, state.looks);
-        if let Some(factor) = factor_of_bound(&judgement, state, standard_errors) {
-            judgement.raise(&factor);
+        if let Some(factor) = factor_of_bound(&judgement, state, settings, standard_errors)? {
+            judgement.raise(factor);
         }
     }
     Ok(judgement)

@@ -140,7 +140,7 @@ pub(super) fn wanted_samples(
         })?;
         return Ok(Wanted { samples: allocation.samples, visibility });
     }
-    let allowed = judgement.allowed_standard_error_cd_m2();
+    let allowed = judgement.decisive_standard_error_cd_m2();
     let samples = Plane::from_fn(variance.width(), variance.height(), |x, y| {
         let standard_error = f64::from(allowed.get(x, y)) * visibility;
         (f64::from(variance.get(x, y)) / (standard_error * standard_error)).clamp(least, most) as f32

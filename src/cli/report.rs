@@ -122,8 +122,8 @@ pub(super) struct Report {
     /// What made the picture out of the mean, and what can be seen of what it left and of what it changed.
     denoised: Option<DenoisedReport>,
     visibility_target: Option<f64>,
-    /// Probability with which visibilities and chances here are no less than the truth, at this look and all before;
-    /// none where they are estimates.
+    /// Probability with which what is told of each place is no less than the truth, over all looks of which plans
+    /// came; none where visibilities are estimates.
     confidence: Option<f64>,
     /// None here and in the figures that follow from it where the samples are too few to tell, as in a render of one
     /// a pixel.
@@ -210,7 +210,7 @@ impl Report {
             detection_probability_p99: quantile(0.99).map(detection_probability),
             patches_noticed: predicted.map(|predicted| patches_noticed(predicted, &settings.viewing.display)),
             measured_over_predicted: predicted
-                .map(|predicted| energy(&judgement.measured_error().visibility) / energy(predicted)),
+                .map(|_| energy(&judgement.measured_error().visibility) / energy(&judgement.estimated())),
             audit_ratio: rendered.audit.filter(|audit| !audit.had_nothing_to_find()).map(|audit| audit.ratio),
             audit_standard_error: rendered.audit.map(|audit| audit.standard_error),
             audit_tiles: rendered.audit.map_or(0, |audit| audit.tiles),

@@ -95,12 +95,16 @@ fn assert_same(one: &Rendered, other: &Rendered) {
 }
 
 /// Stopped at visibility 8 and continued to 4, by way of a file, is 4 in one go, and 1 continued to 0.5 is 0.5; so it
-/// is when `--plans` stopped it.
+/// is when `--plans` stopped it, and where each look is a bound that depends on how many there were.
 #[test]
 fn a_render_that_is_continued_equals_one_in_one_go() {
     let setup = Setup::new(5);
-    for (first, target) in [(8.0, 4.0), (1.0, 0.5)] {
-        let to = |visibility: f64| setup.settings(Sampling::Adaptive, visibility);
+    for (first, target, confidence) in [(8.0, 4.0, None), (1.0, 0.5, None), (8.0, 4.0, Some(0.95))] {
+        let to = |visibility: f64| {
+            let mut settings = setup.settings(Sampling::Adaptive, visibility);
+            settings.limits.confidence = confidence;
+            settings
+        };
         let in_one_go = render(&setup.tracer, &to(target), &Quiet).expect("renders");
         let mut by_plans = to(target);
         by_plans.limits.plans = Some(in_one_go.plans - 2);

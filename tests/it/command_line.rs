@@ -287,6 +287,16 @@ fn bad_arguments_are_refused_in_one_line() {
         render(&["--sampling", rule, "--spp", "16", "--quality", "good"], &["--visibility and --quality"]);
     }
     render(&["--sampling", "budget", "--noise-threshold", "0.1", "--spp", "16"], &["--noise-threshold"]);
+    render(&["--confidence", "0.95"], &["\"0.95\" is not a confidence from 50 to 99.99 per cent"]);
+    for (other, said) in [
+        (&["--sampling", "relative"][..], "use adaptive or uniform"),
+        (&["--model", "tvi"], "tvi pools no pixels"),
+        (&["--denoise", "builtin"], "is for raw pictures"),
+        (&["--transparent"], "leave out --transparent"),
+        (&["--sequence", "z-order"], "use per-pixel"),
+    ] {
+        render(&[&["--confidence", "95"], other].concat(), &["--confidence", said]);
+    }
     render(&["--seed", "-1"], &["invalid value '-1' for '--seed <N>'"]);
     render(&["--crop", "-1,0,4,4"], &["\"-1,0,4,4\" is not a crop"]);
     render(&["--no-such-thing"], &["unexpected argument '--no-such-thing' found\n"]);

@@ -125,7 +125,12 @@ pub(super) fn difference_on_display(
 }
 
 /// Square of half of what the halves differ by as displayed, by channel, (cd/m²)²; 0 where one of them has no samples.
-fn squared_differences(film: &Film, width: usize, tone: &dyn FittedTone, settings: &LoopSettings) -> [Plane; CHANNELS] {
+pub(super) fn squared_differences(
+    film: &Film,
+    width: usize,
+    tone: &dyn FittedTone,
+    settings: &LoopSettings,
+) -> [Plane; CHANNELS] {
     planes_of(width, film.pixel_count(), |index| {
         let Halves::Both(both) = film.halves(index) else { return [0.0; CHANNELS] };
         let pixel = Pixel { x: index % width, y: index / width };

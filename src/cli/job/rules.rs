@@ -1,7 +1,7 @@
 //! How samples are spread and when they end: command line before scene before default, and what does not go together.
 
 use super::JobArguments;
-use super::choices::{AllocationChoice, Quality, SamplingChoice};
+use super::choices::{AllocationChoice, Quality, SamplingChoice, SequenceChoice};
 use crate::cli::seeing::{self, AskedPresentation, Presentation};
 use anyhow::bail;
 use fechner::adaptive::settings::{AllocationRule, Limits, LoopSettings, RivalRule, Sampling, THRESHOLD};
@@ -117,7 +117,17 @@ fn check_confidence(arguments: &JobArguments, stops_by_sight: bool) -> anyhow::R
     }
     if arguments.denoise.kind().is_some() {
         bail!(
-            "--confidence is for raw pictures: what a denoiser changes has no scatter that halves would show; leave out one of the two"
+            "--confidence is for raw pictures: what a denoiser changes has no scatter that halves would show; leave out \
+             one of the two"
+        );
+    }
+    if arguments.transparent {
+        bail!("--confidence is for pictures that hide what is behind them: leave out --transparent or it");
+    }
+    if matches!(arguments.sequence, SequenceChoice::ZOrder) {
+        bail!(
+            "--confidence needs pixels whose errors do not depend on each other, as those of --sequence z-order do: use \
+             per-pixel"
         );
     }
     Ok(())

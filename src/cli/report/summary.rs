@@ -104,9 +104,12 @@ fn noticed(report: &Report, display: &Display, predicted: &Plane) -> Option<Stri
 }
 
 fn confidence(report: &Report) -> Option<String> {
+    // Where too few samples tell there is nothing to be bounded.
+    report.visibility_p99?;
     report.confidence.map(|confidence| {
         format!(
-            "Visibilities and chances are upper bounds: each place is below them with {} % confidence, over all looks.",
+            "Visibilities and chances are upper bounds: each place's holds with {} % confidence, over all looks of \
+             which plans came.",
             rounded(100.0 * confidence)
         )
     })
