@@ -76,7 +76,8 @@ impl ErrorMotion {
 /// use fechner_perception::{Display, Plane, motion::image_velocity_deg_s};
 /// let (right, down) = (Plane::filled(8, 8, 12.0), Plane::filled(8, 8, 0.0));
 /// // 12 pixels in a sixtieth of a second at 60 pixels a degree.
-/// assert_eq!(image_velocity_deg_s(&right, &down, &Display::default())?.get(4, 4), 12.0);
+/// let speed = image_velocity_deg_s(&right, &down, &Display::default())?;
+/// assert!((speed.get(4, 4) - 12.0).abs() < 1e-5);
 /// # Ok::<(), fechner_perception::Error>(())
 /// ```
 pub fn image_velocity_deg_s(motion_x_px: &Plane, motion_y_px: &Plane, display: &Display) -> Result<Plane, Error> {

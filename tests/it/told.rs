@@ -43,7 +43,9 @@ fn motion_to_the_frame_before_alone_is_heeded() {
     assert_ne!(forward, still, "what moves is seen otherwise than what rests");
     for channels in [["backward.u", "backward.v"], ["velocity_previous.X", "velocity_previous.Y"]] {
         let (backward, said) = motion("before.exr", channels, [3.0, 1.0]);
-        assert_eq!(backward, forward, "as fast the other way");
+        // Upwards in the one is downwards in the other, which beside the middle is not quite as fast.
+        let differs = |(a, b): (&f32, &f32)| (a / b - 1.0).abs() > 1e-4;
+        assert!(!backward.iter().zip(&forward).any(differs), "as fast the other way");
         assert!(said.contains("note: before.exr: it has motion to the frame before alone"), "{said}");
         let layer = channels[0].split('.').next().expect("a layer");
         assert!(said.contains(&format!("motion from the channels of {layer} at")), "{said}");

@@ -104,7 +104,7 @@ impl Shown<'_> {
         let is_within =
             brightest < f64::from(WHITE) && brightest * f64::from(largest) <= 1.0 && (!is_normal || fits(0) && fits(1));
         let slope = f64::from(self.span_cd_m2()) * scale;
-        is_within.then(|| (slope * slope * variance) as f32)
+        is_within.then_some((slope * slope * variance) as f32)
     }
 
     fn relative(&self, pixel: Pixel, scene_cd_m2: f64) -> f32 {
