@@ -11,10 +11,10 @@
 //! tell, which are held to what halves may differ by, is some 3 % low. By how much they miss what was told of them is
 //! the scatter of that mean, heavy tails among it; and a window of some hundred pixels or more makes it nearly normal.
 //!
-//! No bound holds for tails of any weight (Bahadur and Savage 1956): of a lognormal with a coefficient of variation of
-//! 2 it fails three times as often as it says. Light that is expected beside lamps is an expectation, not bounded; paths
-//! that were never sampled are in no bound. Not for models that pool nothing, for what a denoiser changed, for pictures
-//! over other pictures, nor for samples whose errors depend on their neighbours' (Z-order).
+//! No bound holds for tails of any weight (Bahadur and Savage 1956): of a lognormal with a coefficient of variation
+//! of 2 it fails three times as often as it says. Light that is expected beside lamps is an expectation, not bounded;
+//! paths that were never sampled are in no bound. Not for models that pool nothing, for what a denoiser changed, for
+//! pictures over other pictures, nor for samples whose errors depend on their neighbours' (Z-order).
 
 use super::judge::{JudgeError, Judgement, variance_shares};
 use super::settings::LoopSettings;

@@ -1,6 +1,6 @@
 //! The loop: trace, look, plan, until nothing more can be seen.
 //!
-//! The loop itself is [`Loop::run_to_end`]; [`render`], [`resume`] and [`run`] lead to it. In turn it
+//! The loop itself is `Loop::run_to_end`; [`render`], [`resume`] and [`run`] lead to it. In turn it
 //!
 //! 1. traces what is planned (`trace_pending`): at first a pilot of some samples in every pixel;
 //! 2. looks at the film as an eye in front of the display would ([`mod@judge`]): thresholds, and how visible the
