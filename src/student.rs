@@ -2,13 +2,13 @@
 
 /// More degrees of freedom than this are taken for this many: the quantile of 95 % is 1.962 there and 1.960 at
 /// infinity.
-const MOST_DEGREES: f64 = 1000.0;
+const MAX_DEGREES: f64 = 1000.0;
 
 /// The half width, in standard errors, of a two-sided interval of this level (0 to 1, without them): 12.7 for 95 % and
 /// one degree of freedom, 1.96 for many. Degrees of freedom may be fractions, of one at least.
 pub(crate) fn t_half_width(level: f64, degrees_of_freedom: f64) -> f64 {
     // What is not a number goes by the widest, too.
-    let degrees = if degrees_of_freedom >= 1.0 { degrees_of_freedom.min(MOST_DEGREES) } else { 1.0 };
+    let degrees = if degrees_of_freedom >= 1.0 { degrees_of_freedom.min(MAX_DEGREES) } else { 1.0 };
     let outside = 1.0 - level;
     let mut high = 1.0;
     while share_outside(high, degrees) > outside && high < 1e12 {

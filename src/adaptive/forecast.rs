@@ -36,12 +36,14 @@ impl<'a> Forecast<'a> {
     /// smear makes of the noise around it, which the allocation's constraints leave out. A dark strip beside bright
     /// noise sees more of it than the strip's own.
     pub(super) fn tolerance(&self) -> Plane {
-        let of_map = |smear: Plane, map: Option<&Plane>, times: fn(f32, f32) -> f32| match map {
-            None => smear,
-            Some(map) => smear.combined(map, times),
-        };
-        let important = of_map(self.smear.clone(), self.judgement.importance.as_ref(), |smear, factor| smear * factor);
-        of_map(important, self.judgement.bound_factor.as_ref(), |smear, factor| smear / factor)
+        let mut tolerance = self.smear.clone();
+        if let Some(map) = &self.judgement.importance {
+            tolerance = tolerance.combined(map, |tolerance, importance| tolerance * importance);
+        }
+        if let Some(factor) = &self.judgement.bound_factor {
+            tolerance = tolerance.combined(factor, |tolerance, factor| tolerance / factor);
+        }
+        tolerance
     }
 
     /// Whether the plan will bring the picture to a visibility, if nothing new is found.
