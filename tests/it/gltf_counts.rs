@@ -206,16 +206,51 @@ fn extensions_of_materials_are_named_though_the_file_declares_none() {
     }
 }
 
-/// The note said that the mesh is left out.
+/// A node places its mesh as often as the extension's accessors say, each within the node's own transform.
 #[test]
-fn a_mesh_of_many_instances_is_there_once() {
+fn a_mesh_of_many_instances_is_at_each_of_them() {
+    let half = std::f32::consts::FRAC_1_SQRT_2;
     let mut file = File::new();
-    file.document["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": {}}});
+    let translations = file.add(&[[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]]);
+    let rotations = file.add(&[[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, half, half], [0.0, 0.0, 0.0, 2.0]]);
+    let scales = file.add(&[[1.0; 3], [2.0; 3], [1.0, 1.0, -1.0]]);
+    let numbers = file.add(&[[0.0], [1.0], [2.0]]);
+    let attributes = json!({"TRANSLATION": translations, "ROTATION": rotations, "SCALE": scales, "_ID": numbers});
+    file.document["nodes"][0]["translation"] = json!([10, 0, 0]);
+    file.document["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
     file.document["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    file.document["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
     let scene = file.load().unwrap();
-    let expected = "EXT_mesh_gpu_instancing is not supported: a mesh that it repeats is rendered once, at its node.";
-    assert!(scene.notes.iter().any(|note| note == expected), "{:?}", scene.notes);
-    assert_eq!(scene.instances.len(), 1);
+    assert!(!scene.notes.iter().any(|note| note.contains("EXT_mesh")), "{:?}", scene.notes);
+    assert_eq!((scene.instances.len(), scene.meshes.len()), (3, 1));
+    let corner = glam::Vec3A::new(1.0, 0.0, 1.0);
+    let found = scene.instances.iter().map(|instance| instance.to_world.transform_point3a(corner));
+    for (found, expected) in found.zip([[12.0, 0.0, 1.0], [10.0, 4.0, 2.0], [11.0, 0.0, 2.0]]) {
+        assert!((found - glam::Vec3A::from(expected)).length() < 1e-5, "{found} for {expected:?}");
+    }
+}
+
+#[test]
+fn instances_that_do_not_fit_are_refused() {
+    type Attributes<'a> = &'a dyn Fn(&mut File) -> Value;
+    let cases: [(Attributes, &str); 6] = [
+        (&|_| json!({}), "node 0: EXT_mesh_gpu_instancing: it has no attributes"),
+        (&|_| json!(3), "expected an object \"attributes\""),
+        (&|_| json!({"SCALE": 9}), "SCALE: expected the index of an accessor, found 9"),
+        (&|_| json!({"SCALE": "a"}), "SCALE: expected the index of an accessor, found \"a\""),
+        (
+            &|file| json!({"SCALE": file.add(&[[1.0; 3]; 2]), "TRANSLATION": file.add(&[[1.0; 3]; 3])}),
+            "TRANSLATION has 3 elements, but the one before has 2",
+        ),
+        (&|file| json!({"TRANSLATION": file.add(&[[1.0; 2]; 2])}), "expected elements of 3 numbers"),
+    ];
+    for (attributes, expected) in cases {
+        let mut file = File::new();
+        let attributes = attributes(&mut file);
+        file.document["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
+        let error = file.load().expect_err(expected);
+        assert!(error.contains(expected), "{error}\n  {expected}");
+    }
 }
 
 /// Only the first of them was named.

@@ -176,6 +176,16 @@ impl Buffers {
         self.floats(accessor)
     }
 
+    /// The file that they are of.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// An error about the file.
+    pub(super) fn wrong_file(&self, problem: impl std::fmt::Display) -> LoadError {
+        LoadError::invalid(&self.path, problem)
+    }
+
     /// An error about a mesh.
     pub(super) fn wrong_mesh(&self, mesh: &str, problem: impl std::fmt::Display) -> LoadError {
         LoadError::invalid(&self.path, format_args!("\"{mesh}\": {problem}"))

@@ -9,6 +9,7 @@ mod buffers;
 mod deform;
 mod document;
 mod extension;
+mod instancing;
 mod material;
 mod motion;
 mod textures;
@@ -51,6 +52,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
     };
     let mut reader = Reader {
         path,
+        document: &document,
         buffers: &buffers,
         materials: Materials::new(path, &document, &buffers),
         meshes: HashMap::new(),
@@ -91,6 +93,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
 
 struct Reader<'a> {
     path: &'a Path,
+    document: &'a ::gltf::Document,
     buffers: &'a Buffers,
     materials: Materials<'a>,
     /// Meshes and materials by (mesh, primitive); `None` for primitives that are not rendered.
@@ -138,22 +141,7 @@ impl<'a> Reader<'a> {
         let to_world = Affine3A::from_mat4(matrices[0]);
         let name = node.name().map_or_else(|| format!("node {}", node.index()), str::to_owned);
         if let Some(mesh) = node.mesh() {
-            let animated = self.moments[0].pose.get(&node.index()).and_then(|posed| posed.weights.clone());
-            let weights = animated.or(node.weights().map(<[f32]>::to_vec)).or(mesh.weights().map(<[f32]>::to_vec));
-            let weights = weights.unwrap_or_default();
-            // A skin's vertices are in world space already: the node's own transform does not count.
-            let is_skinned = node.skin().is_some();
-            let motion = motion::through(&self.moments, matrices).filter(|_| !is_skinned);
-            let to_world = match &motion {
-                _ if is_skinned => Affine3A::IDENTITY,
-                Some(appears) if !motion::is_there(&matrices[0]) => appears.at(0.0),
-                _ => to_world,
-            };
-            if is_skinned || weights.iter().any(|weight| *weight != 0.0) {
-                self.place_deformed(node, &mesh, &name, &weights, to_world, motion)?;
-            } else {
-                self.place(&mesh, &name, to_world, motion)?;
-            }
+            self.place(node, &mesh, &name, matrices)?;
         }
         if let Some(camera) = node.camera() {
             self.camera(&camera, &name, &to_world, motion::of_camera(&self.moments, matrices));
@@ -164,42 +152,68 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    /// Places a node's mesh, once or as often as its instances say.
     fn place(
         &mut self,
+        node: &::gltf::Node<'a>,
         mesh: &::gltf::Mesh,
         name: &str,
-        to_world: Affine3A,
-        motion: Option<Motion>,
+        matrices: &[Mat4],
     ) -> Result<(), LoadError> {
-        if !self.meshes.contains_key(&mesh.index()) {
-            let mut parts = Vec::new();
-            for primitive in mesh.primitives() {
-                if let Some(converted) = self.primitive(mesh, &primitive)? {
-                    let material = self.materials.get(self.builder, &primitive.material())?;
-                    self.note_missing_coordinates(&converted, material);
-                    let mesh = self.builder.add_mesh(converted);
-                    if primitive.morph_targets().next().is_some() {
-                        self.builder.deforming.insert(mesh);
-                    }
-                    parts.push((mesh, material));
-                }
+        let animated = self.moments[0].pose.get(&node.index()).and_then(|posed| posed.weights.clone());
+        let weights = animated.or(node.weights().map(<[f32]>::to_vec)).or(mesh.weights().map(<[f32]>::to_vec));
+        let weights = weights.unwrap_or_default();
+        let is_deformed = node.skin().is_some() || weights.iter().any(|weight| *weight != 0.0);
+        let parts = if is_deformed { self.deformed(node, mesh, name, &weights)? } else { self.at_rest(mesh)? };
+        let places = instancing::places(self.document, self.buffers, node)?;
+        if node.skin().is_some() {
+            if places.is_some() {
+                self.builder.note(format!("\"{name}\" has a skin and instances: it is placed once, by its skin."));
             }
-            self.meshes.insert(mesh.index(), parts);
+            // A skin's vertices are in world space already: the node's own transform does not count.
+            return self.place_parts(&parts, name, Affine3A::IDENTITY, None);
         }
-        let parts = self.meshes[&mesh.index()].clone();
-        self.place_parts(&parts, name, to_world, motion)
+        for place in places.unwrap_or_else(|| vec![Mat4::IDENTITY]) {
+            let matrices: Vec<Mat4> = matrices.iter().map(|matrix| *matrix * place).collect();
+            let motion = motion::through(&self.moments, &matrices);
+            let to_world = match &motion {
+                Some(appears) if !motion::is_there(&matrices[0]) => appears.at(0.0),
+                _ => Affine3A::from_mat4(matrices[0]),
+            };
+            self.place_parts(&parts, name, to_world, motion)?;
+        }
+        Ok(())
+    }
+
+    /// A mesh as it is in the file, the same for all nodes that place it.
+    fn at_rest(&mut self, mesh: &::gltf::Mesh) -> Result<Vec<(MeshId, MaterialId)>, LoadError> {
+        if let Some(parts) = self.meshes.get(&mesh.index()) {
+            return Ok(parts.clone());
+        }
+        let mut parts = Vec::new();
+        for primitive in mesh.primitives() {
+            if let Some(converted) = self.primitive(mesh, &primitive)? {
+                let material = self.materials.get(self.builder, &primitive.material())?;
+                self.note_missing_coordinates(&converted, material);
+                let mesh = self.builder.add_mesh(converted);
+                if primitive.morph_targets().next().is_some() {
+                    self.builder.deforming.insert(mesh);
+                }
+                parts.push((mesh, material));
+            }
+        }
+        self.meshes.insert(mesh.index(), parts.clone());
+        Ok(parts)
     }
 
     /// A mesh with a shape of its own: morphed, skinned or both.
-    fn place_deformed(
+    fn deformed(
         &mut self,
         node: &::gltf::Node,
         mesh: &::gltf::Mesh,
         name: &str,
         weights: &[f32],
-        to_world: Affine3A,
-        motion: Option<Motion>,
-    ) -> Result<(), LoadError> {
+    ) -> Result<Vec<(MeshId, MaterialId)>, LoadError> {
         let joints = node.skin().map(|skin| deform::joints(self.buffers, &skin, name, &self.world)).transpose()?;
         let mut parts = Vec::new();
         for primitive in mesh.primitives() {
@@ -214,7 +228,7 @@ impl<'a> Reader<'a> {
             self.builder.deforming.insert(mesh);
             parts.push((mesh, material));
         }
-        self.place_parts(&parts, name, to_world, motion)
+        Ok(parts)
     }
 
     fn note_missing_coordinates(&mut self, mesh: &Mesh, material: MaterialId) {
