@@ -4,9 +4,16 @@
 //! `2>&1 | head -1`, would end a render of hours without its picture. [`say!`](crate::say!) and
 //! [`answer!`](crate::answer!) take their place everywhere.
 
+use crate::poison::Unpoisoned as _;
 use std::fmt::Arguments;
 use std::io::{self, Write, stderr, stdout};
-use std::sync::OnceLock;
+use std::sync::{OnceLock, RwLock};
+
+/// Lets words be written where something else stands on the terminal, such as a bar: it is called with what writes.
+type MakesWay = Box<dyn Fn(&dyn Fn()) + Send + Sync>;
+
+/// What stands on the terminal while it does.
+static STANDING: RwLock<Option<MakesWay>> = RwLock::new(None);
 
 /// Why an answer is not complete.
 static FAILURE: OnceLock<io::Error> = OnceLock::new();
@@ -30,8 +37,18 @@ pub fn line(words: Arguments) {
 
 /// Words without the end of their line, for those that are written over each other.
 pub fn part(words: Arguments) {
+    let words = words.to_string();
     // Nobody is left to be told that telling failed.
-    let _ = stderr().write_all(words.to_string().as_bytes());
+    let write = || drop(stderr().write_all(words.as_bytes()));
+    match &*STANDING.read().unpoisoned() {
+        Some(makes_way) => makes_way(&write),
+        None => write(),
+    }
+}
+
+/// From here on `makes_way` is asked to let words be written; with `None` they are written at once again.
+pub fn beside(makes_way: Option<MakesWay>) {
+    *STANDING.write().unpoisoned() = makes_way;
 }
 
 /// What [`answer!`](crate::answer!) does.

@@ -94,17 +94,19 @@ impl Origin {
         if self.program != own.program {
             return Some(format!("it was written by {}, and this is {}", self.program, own.program));
         }
-        if self.scene != own.scene {
-            return Some(format!(
-                "it holds another scene (\"{}\", content {}) than \"{}\", content {}: the scene file, a mesh or a texture \
-                 has changed, or what --camera, --look-at, --at, --environment or --nits-per-unit say of it",
-                self.scene_name, self.scene, own.scene_name, own.scene
-            ));
-        }
+        // Before the scene, whose camera may be framed by it.
         if (self.width, self.height) != (own.width, own.height) {
             return Some(format!(
                 "it holds a picture of {}x{} pixels, not of {}x{}",
                 self.width, self.height, own.width, own.height
+            ));
+        }
+        if self.scene != own.scene {
+            return Some(format!(
+                "it holds another scene (\"{}\", content {}) than \"{}\", content {}: the scene file, its side file, a \
+                 mesh or a texture has changed, or what --camera, --look-at, --at, --environment, --texture-memory or \
+                 --nits-per-unit say of it",
+                self.scene_name, self.scene, own.scene_name, own.scene
             ));
         }
         (self.tracing != own.tracing).then(|| {

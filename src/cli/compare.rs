@@ -3,6 +3,7 @@
 mod sequence;
 
 use super::animate::parse_rate;
+use super::finished::all_written;
 use super::kept_tone::shown_by;
 use super::maps::check_map;
 use super::picture::{Ground, InputPicture, Shape, Source};
@@ -124,13 +125,14 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     let compared = Compared::read(arguments)?;
     let difference = compared.difference()?;
     let figures = compared.figures(&difference);
-    if let Some(path) = &arguments.map {
-        say!("{}: {}", path.display(), write_map(path, &difference)?);
-    }
-    if let Some(path) = &arguments.json {
-        json_file::write(path, &figures)?;
-    }
+    // First the answer: it may have taken long.
     tell(&figures);
+    let map = arguments.map.as_ref().map_or(Ok(()), |path| {
+        say!("{}: {}", path.display(), write_map(path, &difference)?);
+        Ok(())
+    });
+    let json = arguments.json.as_ref().map_or(Ok(()), |path| Ok(json_file::write(path, &figures)?));
+    all_written([map, json])?;
     Ok(ExitCode::from(u8::from(figures.seen.is_visible)))
 }
 

@@ -20,6 +20,8 @@ impl Console {
                 .unwrap_or_else(|_| ProgressStyle::default_bar());
             bar.set_style(style);
             bar.enable_steady_tick(Duration::from_millis(200));
+            let stands = bar.clone();
+            say::beside(Some(Box::new(move |write| stands.suspend(write))));
             bar
         });
         Self { bar, time_limit }
@@ -29,6 +31,7 @@ impl Console {
     pub(super) fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
+            say::beside(None);
         }
     }
 
@@ -50,7 +53,7 @@ impl Monitor for Console {
             |share| format!("{:.1} % still visible", 100.0 * share),
         );
         let message = format!(
-            "pass {}  {:.1} spp  {visible}  {}",
+            "look {}  {:.1} spp  {visible}  {}",
             progress.look,
             progress.mean_samples,
             self.time_left(progress, progress.pixels),

@@ -1,10 +1,10 @@
 //! `fechner merge`: films of different seeds in, one film or its picture out.
 
 use super::claim::Claim;
+use super::finished::{Finished, PictureTarget, all_written};
 use super::numbers::parse_positive;
-use super::render::write_picture;
-use super::report::{Interrupter, Report, summary};
-use super::targets::check_distinct;
+use super::report::{Report, summary};
+use super::targets::{check_distinct, check_kept};
 use clap::Args;
 use fechner::adaptive::judge::judge;
 use fechner::adaptive::settings::{Limits, THRESHOLD};
@@ -40,12 +40,12 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     } else {
         (Some(output::check_target(&arguments.output)?), None)
     };
+    // A sum may take the place of one of its films; its picture and figures may not.
+    let picture = format.is_some().then_some(arguments.output.as_path());
+    let films: Vec<_> = arguments.films.iter().map(|film| ("a film", Some(film.as_path()))).collect();
+    check_kept(&films, &[("-o", picture), ("--json", arguments.json.as_deref())])?;
+    check_distinct(&[("-o", Some(&arguments.output)), ("--json", arguments.json.as_deref())])?;
     if let Some(json) = &arguments.json {
-        // A sum may take the place of one of its films; figures may not.
-        let films = arguments.films.iter().map(|film| ("a film to merge", film));
-        for (what, path) in films.chain([("-o", &arguments.output)]) {
-            check_distinct(&[(what, Some(path)), ("--json", Some(json))])?;
-        }
         output::check_writable(json)?;
     }
     let mut merged = merge_files(&arguments.films)?;
@@ -70,16 +70,15 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     let reason = if is_reached(&judgement, visibility) { StopReason::Visibility } else { StopReason::Merged };
     let rendered = Rendered::new(merged.state, judgement, reason);
     let report = Report::new(&merged.header.origin.scene_name, &merged.header.seeds.all, &settings, &rendered);
-    if let Some(format) = format {
+    let finished = Finished { rendered: &rendered, settings: &settings, report: &report };
+    let picture = format.map_or(Ok(()), |format| {
         let part_of = merged.header.origin.part_of();
-        write_picture(&arguments.output, format, background, &rendered, &settings, &report, part_of)?;
-    }
-    if let Some(path) = &arguments.json {
-        json_file::write(path, &report)?;
-    }
+        PictureTarget { path: &arguments.output, format, background, part_of }.write_here_or_elsewhere(finished)
+    });
+    let figures = arguments.json.as_ref().map_or(Ok(()), |path| Ok(json_file::write(path, &report)?));
     say!("Films of the seeds {}:", merged.header.seeds.in_words());
-    say!("{}", summary(&report, &settings, &rendered, Interrupter::Signal));
-    Ok(())
+    say!("{}", summary(finished, None));
+    all_written([picture, figures])
 }
 
 fn is_film(path: &Path) -> bool {

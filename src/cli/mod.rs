@@ -8,6 +8,7 @@ mod compare;
 mod console;
 mod denoise;
 mod farm;
+mod finished;
 mod importance;
 mod info;
 mod job;

@@ -2,29 +2,27 @@
 
 use super::CALL_AGAIN;
 use super::console::Console;
+use super::finished::{Finished, PictureTarget, all_written};
 use super::job::{JobArguments, Prepared};
 use super::keeper::{CheckpointArguments, Keeper, SeedsSoFar, Start, Watch};
 use super::maps::{MapTarget, check_map};
-use super::picture::{LIGHT_RAISES_ALPHA, note};
 use super::report::{Interrupter, Report, summary};
 use super::signals::listen;
 use super::targets::{Named, check_kept, check_scene_kept};
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
 use super::words::{count, in_a_line};
-use anyhow::{anyhow, bail};
+use anyhow::anyhow;
 use clap::Args;
 use fechner::adaptive::judge::JudgeError;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
-use fechner::adaptive::{self, Rendered, StopReason};
+use fechner::adaptive::{self, StopReason};
 use fechner::checkpoint::{Header, Origin, SettingsRecord};
 use fechner::integrator::{Crop, PathTracer, TraceSettings};
 use fechner::json_file;
-use fechner::output::rendered::Background;
 use fechner::output::{self, PartOf, PictureFormat};
 use fechner::scene::Scene;
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -108,8 +106,11 @@ fn render_and_write(arguments: &RenderArguments, format: PictureFormat) -> anyho
     };
     let seeds = &seeds.of(&rendered.film).all;
     let report = Report::new(&arguments.job.scene_name(), seeds, &settings, &rendered);
-    let files = FilesWritten::try_all(arguments, format, &rendered, &settings, &report, PartOf::of(&trace));
-    say!("{}", summary(&report, &settings, &rendered, interrupter));
+    let background = arguments.job.background();
+    let target = PictureTarget { path: &arguments.output, format, background, part_of: PartOf::of(&trace) };
+    let finished = Finished { rendered: &rendered, settings: &settings, report: &report };
+    let files = FilesWritten::try_all(arguments, target, finished);
+    say!("{}", summary(finished, Some(interrupter)));
     files.or_failures(&arguments.output, watch)?;
     let is_unfinished = rendered.stop_reason == StopReason::Interrupted && interrupter == Interrupter::Signal;
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
@@ -170,17 +171,9 @@ struct FilesWritten {
 
 impl FilesWritten {
     /// Each is tried, whatever became of the others.
-    fn try_all(
-        arguments: &RenderArguments,
-        format: PictureFormat,
-        rendered: &Rendered,
-        settings: &LoopSettings,
-        report: &Report,
-        part_of: Option<PartOf>,
-    ) -> Self {
-        let background = arguments.job.background();
-        let write = |path: &Path| write_picture(path, format, background, rendered, settings, report, part_of);
-        let picture = write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error));
+    fn try_all(arguments: &RenderArguments, target: PictureTarget, finished: Finished) -> Self {
+        let Finished { rendered, settings, report } = finished;
+        let picture = target.write_here_or_elsewhere(finished);
         let maps = all_written(arguments.maps.iter().map(|map| {
             say!("{}", map.write(rendered, settings.limits.visibility_or_threshold())?);
             Ok(())
@@ -204,68 +197,5 @@ fn failed(error: &JudgeError, watch: Watch<'_>) -> anyhow::Error {
     match watch.report() {
         Ok(()) => anyhow!("{error}"),
         Err(lost) => anyhow!("{error}; {}", in_a_line(&lost)),
-    }
-}
-
-/// All that could not be written, in one error.
-fn all_written(files: impl IntoIterator<Item = anyhow::Result<()>>) -> anyhow::Result<()> {
-    let failures: Vec<String> = files.into_iter().filter_map(Result::err).map(|error| in_a_line(&error)).collect();
-    if failures.is_empty() { Ok(()) } else { bail!(failures.join("; ")) }
-}
-
-/// Writes a picture that cannot be where it should into a new folder among temporary files, and says so: its samples
-/// took long. Others may write there too, and must not know the folder's name beforehand.
-fn kept_elsewhere(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>, error: anyhow::Error) -> anyhow::Error {
-    // Names may be longer where it should be than among temporary files.
-    let name = output::shortened_name(path.file_name().unwrap_or(OsStr::new("picture")));
-    let keep = || -> anyhow::Result<PathBuf> {
-        let folder = tempfile::Builder::new().prefix("fechner-").tempdir()?;
-        write(&folder.path().join(&name))?;
-        Ok(folder.keep().join(&name))
-    };
-    match keep() {
-        Ok(elsewhere) => error.context(format!("the picture is in {}", elsewhere.display())),
-        Err(_) => error,
-    }
-}
-
-/// Writes the picture in the format that its name asks for; a PNG has no place in a whole.
-pub(super) fn write_picture(
-    path: &Path,
-    format: PictureFormat,
-    background: Background,
-    rendered: &Rendered,
-    settings: &LoopSettings,
-    report: &Report,
-    part_of: Option<PartOf>,
-) -> anyhow::Result<()> {
-    match format {
-        PictureFormat::Png => {
-            if output::rendered::write_display_png(path, rendered, &settings.viewing.display, background)? {
-                note(path, LIGHT_RAISES_ALPHA);
-            }
-        }
-        PictureFormat::Exr => {
-            let attributes = report.attributes();
-            output::rendered::write_layers_exr(path, rendered, settings, background, &attributes, part_of)?;
-        }
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Regression: a name that was too long for its folder was too long for the other as well, and the picture was
-    /// lost.
-    #[test]
-    fn a_picture_of_a_long_name_is_kept_elsewhere() {
-        let long = PathBuf::from(format!("{}.exr", "w".repeat(252)));
-        let write = |path: &Path| Ok(std::fs::write(path, "light")?);
-        let said = kept_elsewhere(&long, write, anyhow!("no room")).to_string();
-        let kept = Path::new(said.strip_prefix("the picture is in ").expect("where it is"));
-        assert_eq!(std::fs::read_to_string(kept).expect("written"), "light");
-        std::fs::remove_dir_all(kept.parent().expect("a folder")).expect("removed");
     }
 }

@@ -90,9 +90,11 @@ impl SeeingArguments {
         }
     }
 
-    /// Says which of what was asked for the model does not look at.
-    pub(super) fn note_what_is_idle(&self, model: &dyn ThresholdModel) {
-        if !model.knows_csf() {
+    /// Says which of what was asked for the model does not look at, which may judge colours beside luminance.
+    pub(super) fn note_what_is_idle(&self, model: &dyn ThresholdModel, judges_colours: bool) {
+        if judges_colours {
+            self.note_area_of_colours();
+        } else if !model.knows_csf() {
             let is_asked = [("--csf", self.csf != csf::DEFAULT), ("--csf-area", self.csf_area.is_some())];
             for (argument, _) in is_asked.iter().filter(|(_, is_asked)| *is_asked) {
                 say!("note: {argument} changes nothing: the model {} does not ask for it", model.name());

@@ -97,7 +97,15 @@ fn check_targets(arguments: &ThresholdArguments) -> Result<()> {
     if output::check_target(&arguments.output)? != PictureFormat::Exr {
         bail!("{}: threshold maps are data; end the name in .exr", arguments.output.display());
     }
+    if arguments.velocity.is_some() {
+        check_knows_motion(model::named(&arguments.model)?.as_ref())?;
+    }
     Ok(())
+}
+
+/// Whether noise in colours is judged beside luminance: by the default model, the only one that has thresholds for it.
+fn judges_colours(model: &dyn ThresholdModel) -> bool {
+    model.name() == model::DEFAULT
 }
 
 /// A picture, and who looks at it in which way.
@@ -142,7 +150,7 @@ impl Asked {
         let display = output::display_attribute(&viewing.display);
         let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
         let model = model::named(&arguments.model)?;
-        arguments.seeing.note_what_is_idle(model.as_ref());
+        arguments.seeing.note_what_is_idle(model.as_ref(), halves.is_some() && judges_colours(model.as_ref()));
         let made_of = halves.as_ref().map_or(MadeOf::Else, |halves| MadeOf::of(&guide, halves));
         if let Some(told) = made_of.told().filter(|_| model.name() == model::DEFAULT) {
             note(&arguments.input, told);
@@ -153,7 +161,6 @@ impl Asked {
         let motion = match &velocity {
             None => None,
             Some((path, exr)) => {
-                check_knows_motion(model.as_ref())?;
                 let motion = velocity_in(path, exr, viewing.display.frames_per_second)?;
                 Some(Motion::of(&motion, arguments.saliency, &guide, fitted.as_deref(), &viewing)?)
             }
@@ -202,10 +209,10 @@ impl Asked {
     }
 
     /// How visible the noise of two halves is: by the model's own thresholds of luminance, and by those of colour where
-    /// it is the default, which is the only one that is made for them.
+    /// it knows them.
     fn noise_visibility(&self, noise: &HalfDifference, inputs: &ModelInputs<'_>) -> Result<Plane> {
         let of_luminance = self.model.measured_visibility(inputs, &noise.luminance)?;
-        if self.model.name() != model::DEFAULT {
+        if !judges_colours(self.model.as_ref()) {
             return Ok(of_luminance);
         }
         let (size, guide) = (self.guide.size(), self.displayed_rgb(&self.guide));

@@ -365,7 +365,11 @@ struct Eye {
 impl Eye {
     fn new(arguments: &TonemapArguments, operator: &dyn ToneOperator) -> Result<Self> {
         if !operator.sees_adaptation() {
-            bail!("{} does not know an eye that adapts over time", operator.name());
+            bail!(
+                "{} does not know an eye that adapts over time: choose another --operator, or show each picture by a call \
+                 of its own",
+                operator.name()
+            );
         }
         let kinetics = operator.kinetics();
         let mut state = arguments.adapted_to.map(|cd_m2| AdaptationState::adapted_to(Goal::both(cd_m2), &kinetics));

@@ -1,8 +1,8 @@
 //! `fechner view`: a render in a browser, while it is made. What its page shows is left to `fechner::preview`.
 
+use super::finished::{Finished, PictureTarget};
 use super::in_a_line;
 use super::job::{JobArguments, Prepared};
-use super::render::write_picture;
 use super::report::Report;
 use super::signals;
 use super::tev::TevArguments;
@@ -66,7 +66,8 @@ impl Host for FileHost {
             let format = output::check_target(path)?;
             let report = Report::new(&self.job.scene_name(), &[self.job.seed()], settings, rendered);
             let part_of = *self.part_of.lock().unpoisoned();
-            write_picture(path, format, self.job.background(), rendered, settings, &report, part_of)
+            let target = PictureTarget { path, format, background: self.job.background(), part_of };
+            target.write(Finished { rendered, settings, report: &report })
         };
         write().map_err(|error| in_a_line(&error))?;
         self.has_saved.store(true, Ordering::Relaxed);

@@ -74,7 +74,7 @@ impl<'a> Audience<'a> {
         let blank = blank_status(scene, settings, &record.operator, &Held::at_home(&scene.camera));
         let status = Status { phase: Phase::Rendering, exposure: record.exposure_stops, is_driven: false, ..blank };
         let moving = Moving {
-            screen: Screen::new(Vec::new()),
+            screen: Screen::new(Arc::default()),
             pace: Pace::new(),
             progress: None,
             status,
@@ -159,6 +159,15 @@ impl<'a> Audience<'a> {
             StopReason::Interrupted => "stopped by a signal",
             reason => in_words(reason),
         });
+        self.show(&mut moving, state);
+        self.close();
+    }
+
+    /// The render failed: shows what there is, says so, and sends everybody away.
+    pub fn failed(&self, state: &RenderState) {
+        let mut moving = self.moving();
+        moving.status.phase = Phase::Stopped;
+        moving.status.error = Some("the render failed: why is said where it was started".to_owned());
         self.show(&mut moving, state);
         self.close();
     }

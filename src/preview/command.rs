@@ -98,6 +98,11 @@ impl Command {
         matches!(self, Self::Camera { .. } | Self::CameraHome | Self::Restart)
     }
 
+    /// Whether it wants the picture that is there when it comes.
+    pub(super) fn keeps_the_picture(&self) -> bool {
+        matches!(self, Self::Save { .. })
+    }
+
     /// Whether it makes an earlier one useless that nobody has obeyed yet: a slider says where it stands.
     pub(super) fn replaces(&self, earlier: &Self) -> bool {
         let is_setting = matches!(

@@ -11,10 +11,11 @@ use crate::adaptive::statistics::picture_variance;
 use crate::film::Film;
 use crate::output::encode_srgb8;
 use crate::output::false_colour::{self, Colours};
+use crate::poison::Unpoisoned as _;
 use fechner_perception::Plane;
 use fechner_perception::tone::{FittedTone, SavedTone, SceneLight, map_picture};
 use glam::Vec2;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Bounds of [`best_interval`]: a batch is about as long as the least, and a picture that changes less often seems to
@@ -99,8 +100,11 @@ pub(super) struct Screen {
     /// Until the first look.
     provisional: Option<ProvisionalTone>,
     encoding: Arc<Encoding>,
-    spectators: Vec<Box<dyn Spectator>>,
+    spectators: Spectators,
 }
+
+/// Who is shown each frame beside browsers. They outlive a picture that a defect ends.
+pub(super) type Spectators = Arc<Mutex<Vec<Box<dyn Spectator>>>>;
 
 /// The operator on a picture that was not looked at yet.
 struct ProvisionalTone {
@@ -119,7 +123,7 @@ impl ProvisionalTone {
 }
 
 impl Screen {
-    pub(super) fn new(spectators: Vec<Box<dyn Spectator>>) -> Self {
+    pub(super) fn new(spectators: Spectators) -> Self {
         let motion = Motion::Unknown("not known to a running render");
         Self {
             started: Instant::now(),
@@ -137,8 +141,8 @@ impl Screen {
 
     /// A new picture begins: no look was taken and the next frame is due.
     pub(super) fn begin(&mut self) {
-        let spectators = std::mem::take(&mut self.spectators);
-        *self = Self { cost: self.cost, encoding: Arc::clone(&self.encoding), ..Self::new(spectators) };
+        let (encoding, spectators) = (Arc::clone(&self.encoding), Arc::clone(&self.spectators));
+        *self = Self { cost: self.cost, encoding, ..Self::new(spectators) };
     }
 
     /// What was seen holds no more: another place.
@@ -158,7 +162,7 @@ impl Screen {
 
     /// Time between two frames now; `None` where nobody looks.
     pub(super) fn between_frames(&self, shared: &Shared) -> Option<Duration> {
-        let is_watched = !self.spectators.is_empty() || shared.has_viewers();
+        let is_watched = !self.spectators.lock().unpoisoned().is_empty() || shared.has_viewers();
         is_watched.then(|| interval(self.started.elapsed(), self.cost + self.encoding.cost()))
     }
 
@@ -204,7 +208,7 @@ impl Screen {
             nits_per_unit,
             stage,
         };
-        self.spectators.iter_mut().for_each(|spectator| spectator.shown(&shown));
+        self.spectators.lock().unpoisoned().iter_mut().for_each(|spectator| spectator.shown(&shown));
         shared.publish_snapshot(Snapshot {
             width: scenery.film.width() as usize,
             step: scenery.step as usize,
@@ -335,7 +339,7 @@ mod tests {
     /// Until somebody takes a seat.
     #[test]
     fn nobody_is_shown_no_frame() {
-        let (screen, shared) = (Screen::new(Vec::new()), Arc::new(Shared::new()));
+        let (screen, shared) = (Screen::new(Arc::default()), Arc::new(Shared::new()));
         let is_due = || screen.is_due(screen.between_frames(&shared));
         assert!(!is_due());
         let seat = Seat::take(&shared, Layer::Depth);
@@ -359,7 +363,7 @@ mod tests {
         let mut film = Film::new(2, 1);
         [0, 1].into_iter().for_each(|pixel| add(&mut film, BlockWork::whole(pixel, Half::A, 0), 1.0));
         let (before, after) = (settings_with("constant"), settings_with("reinhard02"));
-        let mut screen = Screen::new(Vec::new());
+        let mut screen = Screen::new(Arc::default());
         screen.total_samples = film.total_samples();
         let legend = |screen: &mut Screen, settings: &LoopSettings, stage: Stage| {
             let scenery = Scenery { film: &film, tone: None, settings, stage, step: 1 };
@@ -384,7 +388,7 @@ mod tests {
         let plane = || Plane::from_fn(2, 1, |_, _| 1.0);
         let looked = Looked { threshold: plane(), visibility: plane(), denoised: Some(Arc::new(vec![[7.0; 3]; 2])) };
         let shared = Arc::new(Shared::new());
-        let mut screen = Screen::new(Vec::new());
+        let mut screen = Screen::new(Arc::default());
         screen.looked = Some(Arc::new(looked));
         let shown = |screen: &mut Screen| {
             let scenery = Scenery { film: &film, tone: None, settings: &settings, stage: Stage::AtRest, step: 1 };

@@ -18,7 +18,7 @@ mod watch;
 use super::coarse::order;
 use super::command::{Command, Phase};
 use super::glimpse::{Glimpse, Resolution};
-use super::screen::{Scenery, Screen};
+use super::screen::{Scenery, Screen, Spectators};
 use super::shared::Shared;
 use super::spectator::Stage;
 use super::{Host, Job, Options};
@@ -44,24 +44,28 @@ use watch::{Moving, Watch};
 
 /// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved
 /// scene file starts it again.
-pub(super) fn run(job: Job, host: &Arc<dyn Host>, mut options: Options, shared: &Arc<Shared>) {
-    let mut next = Some(job);
+pub(super) fn run(job: Job, host: &Arc<dyn Host>, options: Options, shared: &Arc<Shared>) {
+    let Options { is_foveated, spectators } = options;
+    let spectators: Spectators = Arc::new(Mutex::new(spectators));
+    let mut next = Ok(job);
     while !shared.is_closing() {
-        let Some(job) = next.take() else {
-            let is_asked = shared.take_commands().iter().any(|c| matches!(c, Command::Reload | Command::Restart));
-            next = if is_asked { host.load().ok() } else { None };
-            if next.is_none() {
-                shared.wait(Duration::from_millis(250));
-            }
-            continue;
-        };
-        let work = || Session::new(job, host, &mut options, shared).map(Session::work);
-        let problem = match catch_unwind(AssertUnwindSafe(work)) {
-            Ok(Ok(())) => return,
-            Ok(Err(problem)) => problem,
-            Err(_) => "the program has a defect here; its message stands where fechner view was started".to_owned(),
+        let work = |job| Session::new(job, host, is_foveated, &spectators, shared).map(Session::work);
+        let problem = match next.map(|job| catch_unwind(AssertUnwindSafe(|| work(job)))) {
+            Ok(Ok(Ok(()))) => return,
+            Ok(Ok(Err(problem))) | Err(problem) => problem,
+            Ok(Err(_)) => "the program has a defect here; its message stands where fechner view was started".to_owned(),
         };
         shared.publish_status(serde_json::json!({ "kind": "status", "phase": "failed", "error": problem }).to_string());
+        wait_to_load_again(shared);
+        next = host.load();
+    }
+}
+
+/// Until somebody saves the scene file or asks to begin anew, or the preview closes.
+fn wait_to_load_again(shared: &Shared) {
+    let is_asked = || shared.take_commands().iter().any(|c| matches!(c, Command::Reload | Command::Restart));
+    while !shared.is_closing() && !is_asked() {
+        shared.wait(Duration::from_millis(250));
     }
 }
 
@@ -95,14 +99,20 @@ struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    fn new(job: Job, host: &'a Arc<dyn Host>, options: &mut Options, shared: &'a Arc<Shared>) -> Result<Self, String> {
+    fn new(
+        job: Job,
+        host: &'a Arc<dyn Host>,
+        is_foveated: bool,
+        spectators: &Spectators,
+        shared: &'a Arc<Shared>,
+    ) -> Result<Self, String> {
         let live = Live::default();
         let settings = interruptible(settings_of(&job, &live, job.whole.as_ref())?, shared);
         let tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
         Ok(Self {
             host,
             shared,
-            gaze: options.is_foveated.then(|| Follower::new(settings.viewing.display.pixel_density())),
+            gaze: is_foveated.then(|| Follower::new(settings.viewing.display.pixel_density())),
             hand: Hand::at_home(&job.scene.camera),
             resolution: Resolution::new(),
             glimpse: None,
@@ -111,7 +121,7 @@ impl<'a> Session<'a> {
             phase: Phase::Moving,
             state: RenderState::new(0, 0, &settings.limits),
             rest_look: RestLook::default(),
-            screen: Screen::new(std::mem::take(&mut options.spectators)),
+            screen: Screen::new(Arc::clone(spectators)),
             neighbours: None,
             pace: Pace::new(),
             progress: None,

@@ -66,7 +66,9 @@ impl Shared {
         if let Some(earlier) = commands.back_mut().filter(|earlier| command.replaces(earlier)) {
             *earlier = command;
         } else if commands.len() < MAX_COMMANDS {
-            self.is_cancelled.fetch_or(command.throws_the_picture_away(), Ordering::SeqCst);
+            // What is to be kept is kept first.
+            let is_of_no_use = command.throws_the_picture_away() && !commands.iter().any(Command::keeps_the_picture);
+            self.is_cancelled.fetch_or(is_of_no_use, Ordering::SeqCst);
             commands.push_back(command);
         }
         self.arrived.notify_all();
@@ -217,6 +219,7 @@ impl Drop for Seat {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::PictureFormat;
 
     /// Of a slider's ticks the last counts, and nothing that came between two of them is passed over.
     #[test]
@@ -228,6 +231,22 @@ mod tests {
         let stops = |command: &Command| if let Command::Exposure { stops } = command { *stops } else { None };
         let left: Vec<Option<f64>> = shared.take_commands().iter().map(stops).collect();
         assert_eq!(left, [Some(2.0), None, Some(3.0), None, Some(5.0)]);
+    }
+
+    /// A camera that moves right after a save came threw away the picture that was to be saved, and its own was.
+    #[test]
+    fn what_is_to_be_saved_is_not_thrown_away() {
+        let save = || Command::Save { format: PictureFormat::Png };
+        for (commands, is_cancelled) in
+            [(vec![save(), Command::CameraHome], false), (vec![Command::CameraHome, save()], true)]
+        {
+            let shared = Shared::new();
+            commands.into_iter().for_each(|command| shared.send(command));
+            assert_eq!(shared.is_cancelled(), is_cancelled);
+            shared.take_commands();
+            shared.send(Command::CameraHome);
+            assert!(shared.is_cancelled());
+        }
     }
 
     /// Who leaves looks nowhere, and takes no other's gaze along.

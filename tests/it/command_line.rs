@@ -183,9 +183,17 @@ fn merging_keeps_alpha_and_films() {
     let render =
         ["render", dark, "--size", "16x16", "--spp", "4", "-o", "a.exr", "--transparent", "--checkpoint", "a.film"];
     command::run(fechner().args(render).current_dir(folder.path()));
-    let refused = run(&["merge", "a.film", "-o", "b.exr", "--json", "a.film"]);
-    let message = String::from_utf8_lossy(&refused.stderr);
-    assert!(refused.status.code() == Some(2) && message.contains("a film to merge and --json"), "{message}");
+    let film = std::fs::read(folder.path().join("a.film")).expect("a film");
+    std::fs::write(folder.path().join("film.exr"), &film).expect("written");
+    for (arguments, option) in [
+        (["merge", "a.film", "-o", "b.exr", "--json", "a.film"].as_slice(), "--json"),
+        (&["merge", "film.exr", "-o", "film.exr"], "-o"),
+    ] {
+        let refused = run(arguments);
+        let message = String::from_utf8_lossy(&refused.stderr);
+        let expected = format!("{option} would replace a film that is read");
+        assert!(refused.status.code() == Some(2) && message.contains(&expected), "{message}");
+    }
     let refused = run(&["merge", "a.film", "-o", "b.exr", "--json", "b.exr"]);
     assert_eq!(refused.status.code(), Some(2), "{}", String::from_utf8_lossy(&refused.stderr));
     command::run(fechner().args(["merge", "a.film", "-o", "b.exr"]).current_dir(folder.path()));

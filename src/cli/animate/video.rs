@@ -81,10 +81,18 @@ fn encode(
     let pipe = ffmpeg.stdin.take().context("ffmpeg takes no input")?;
     let sent = stream(BufWriter::new(pipe), files, fitted, shot);
     let ended = ffmpeg.wait().context("ffmpeg")?;
-    if !ended.success() {
-        bail!("ffmpeg failed with {ended}");
+    match sent {
+        // It also fails of what came to an end too soon.
+        Err(error) if !is_by_the_reader(&error) => Err(error),
+        _ if !ended.success() => bail!("ffmpeg failed with {ended}"),
+        sent => sent,
     }
-    sent
+}
+
+/// Whether writing failed since nobody reads any more.
+fn is_by_the_reader(error: &anyhow::Error) -> bool {
+    let kinds = error.chain().filter_map(|cause| cause.downcast_ref::<io::Error>()).map(io::Error::kind);
+    kinds.into_iter().any(|kind| kind == io::ErrorKind::BrokenPipe)
 }
 
 fn stream<W: Write>(

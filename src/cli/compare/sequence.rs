@@ -310,9 +310,6 @@ impl<'a> Sequences<'a> {
             worst_frame: worst.frame,
             frames,
         };
-        if let Some(path) = &self.arguments.json {
-            json_file::write(path, &figures)?;
-        }
         answer!(
             "{}: worst visibility {:.2} in frame {} (seen in a 1° patch with {:.1} %), {:.2} % of {} above threshold, \
              on \"{}\" at {} pixels a degree and {} frames a second, by an eye that {} ({OF_THE_MODEL})",
@@ -327,6 +324,9 @@ impl<'a> Sequences<'a> {
             figures.frames_per_second,
             if figures.eye_follows { "follows what moves" } else { "rests" },
         );
+        if let Some(path) = &self.arguments.json {
+            json_file::write(path, &figures)?;
+        }
         Ok(ExitCode::from(u8::from(seen.is_visible)))
     }
 }

@@ -1,9 +1,9 @@
 //! What a farm renders, from the arguments in its manifest: as `render` or `animate` understand them.
 
 use crate::cli::animate::{AnimateArguments, Shot, ShotFrame};
+use crate::cli::finished::{Finished, PictureTarget};
 use crate::cli::job::{JobArguments, Prepared};
 use crate::cli::keeper::fit_in;
-use crate::cli::render::write_picture;
 use crate::cli::report::Report;
 use crate::cli::words::in_a_line_of_arguments;
 use anyhow::{Context, Result, anyhow, bail};
@@ -279,7 +279,8 @@ impl Frame<'_> {
                 let path = farm.picture(frame_index);
                 let format = output::check_target(&path)?;
                 let part_of = self.header.origin.part_of();
-                write_picture(&path, format, arguments.background(), &rendered, settings, &report, part_of)?;
+                let target = PictureTarget { path: &path, format, background: arguments.background(), part_of };
+                target.write(Finished { rendered: &rendered, settings, report: &report })?;
                 say!("{}: {}", path.display(), report.in_a_line());
                 Ok(report)
             }

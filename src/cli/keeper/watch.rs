@@ -119,6 +119,12 @@ impl Monitor for Watch<'_> {
     }
 
     fn failed(&self, state: &RenderState) {
+        if let Some(audience) = &self.audience {
+            audience.failed(state);
+        }
+        if let Some(tev) = &self.tev {
+            tev.ended(state);
+        }
         if let Some(keeper) = &self.keeper {
             keeper.ended(state);
         }

@@ -2,9 +2,10 @@
 
 use super::{Report, TOO_FEW, patch_count};
 use crate::cli::console::duration_in_words;
+use crate::cli::finished::Finished;
 use crate::cli::words::{OF_THE_MODEL, count, rounded};
 use fechner::adaptive::audit::MAX_INFLATION;
-use fechner::adaptive::settings::{LoopSettings, Sampling};
+use fechner::adaptive::settings::Sampling;
 use fechner::adaptive::{Rendered, StopReason};
 use fechner_perception::Plane;
 use fechner_perception::display::Display;
@@ -20,13 +21,9 @@ pub(in crate::cli) enum Interrupter {
 }
 
 /// The end of a render in plain words; `interrupter` has ended it if anybody has.
-pub(in crate::cli) fn summary(
-    report: &Report,
-    settings: &LoopSettings,
-    rendered: &Rendered,
-    interrupter: Interrupter,
-) -> String {
-    let mut lines = vec![spent(report), stopped(report, settings, rendered, interrupter)];
+pub(in crate::cli) fn summary(finished: Finished, interrupter: Option<Interrupter>) -> String {
+    let Finished { rendered, settings, report } = finished;
+    let mut lines = vec![spent(report), stopped(finished, interrupter)];
     lines.extend(noticed(report, &settings.viewing.display, &rendered.judgement.predicted));
     lines.extend(confidence(report));
     lines.extend(importance(report));
@@ -50,7 +47,8 @@ fn spent(report: &Report) -> String {
     )
 }
 
-fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered, interrupter: Interrupter) -> String {
+fn stopped(finished: Finished, interrupter: Option<Interrupter>) -> String {
+    let Finished { rendered, settings, report } = finished;
     let why = match rendered.stop_reason {
         StopReason::Visibility => "Stopped because the target is reached",
         StopReason::Time if settings.limits.time.is_some_and(|limit| rendered.seconds.total < limit.as_secs_f64()) => {
@@ -67,8 +65,9 @@ fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered, interr
         StopReason::Plans => "Stopped after the plans asked for",
         StopReason::Rule => "Stopped because the rule asked for is satisfied",
         StopReason::Interrupted => match interrupter {
-            Interrupter::Signal => "Stopped by a signal",
-            Interrupter::Viewer => "Stopped from the page of --view",
+            Some(Interrupter::Signal) => "Stopped by a signal",
+            Some(Interrupter::Viewer) => "Stopped from the page of --view",
+            None => "Stopped before it was done",
         },
         StopReason::Merged => "Merged",
     };

@@ -118,7 +118,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 }
 
 fn load_at_time(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
-    let is_foreign = path.extension().is_some_and(|extension| extension != "toml");
+    let is_foreign = path.extension().is_some_and(|extension| !extension.eq_ignore_ascii_case("toml"));
     let side = if is_foreign { toml::side::of(path)? } else { None };
     let Some(side) = side else { return load_alone(path, options) };
     let options = &toml::side::before(&side, options)?;

@@ -9,6 +9,7 @@ use super::LoadOptions;
 pub(super) use super::adjust::{Adjust, Number};
 use super::error::{LoadError, Place};
 use super::texture_memory::{self, Alpha, Extent};
+use crate::poison::Unpoisoned as _;
 use crate::scene::{Encoding, Texture, TextureId, Wrap};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -16,8 +17,7 @@ use std::collections::hash_map::DefaultHasher;
 use std::collections::{HashMap, HashSet};
 use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// Where a picture comes from.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -212,11 +212,14 @@ fn decode_all(
     covering: &HashSet<&Picture>,
     on_texture: Option<fn(usize, usize)>,
 ) -> Vec<Result<Decoded, LoadError>> {
-    let done = AtomicUsize::new(0);
+    let done = Mutex::new(0);
     let decode_one = |((picture, encoding, adjust), halvings): (&Wanted, &u32)| {
         let decoded = decode::decode(picture, *encoding, adjust.values(*encoding));
         if let Some(tell) = on_texture {
-            tell(done.fetch_add(1, Ordering::Relaxed) + 1, wanted.len());
+            // Told as it is counted: what is told last is the last.
+            let mut done = done.lock().unpoisoned();
+            *done += 1;
+            tell(*done, wanted.len());
         }
         let (alpha, decoded) = match covering.contains(picture) {
             true => (Alpha::Coverage, decoded?.without_alpha_in_colours()),
