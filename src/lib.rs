@@ -21,6 +21,7 @@ pub mod benchmark;
 pub mod bsdf;
 pub mod checkpoint;
 pub mod denoise;
+pub mod digits;
 pub mod exr_read;
 pub mod farm;
 pub mod film;

@@ -159,6 +159,13 @@ impl Display {
         self.emitted_cd_m2(relative) + self.ambient_cd_m2
     }
 
+    /// Linear RGB, cd/m², that this display shows for linear light of each channel: what
+    /// [`luminance_cd_m2`](Self::luminance_cd_m2) says of each.
+    #[must_use]
+    pub fn rgb_cd_m2(&self, relative: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        relative.iter().map(|rgb| rgb.map(|light| self.luminance_cd_m2(f64::from(light)) as f32)).collect()
+    }
+
     /// Luminance, cd/m², that this display itself emits for linear light `relative` (clamped to 0..1; NaN counts as 0):
     /// [`Display::luminance_cd_m2`] without what the screen reflects of the room's light.
     #[must_use]

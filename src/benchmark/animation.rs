@@ -306,9 +306,8 @@ impl<'a> Bench<'a> {
 
     fn displayed(&self, index: usize, rgb_cd_m2: &[[f32; 3]]) -> Vec<f32> {
         let fitted = self.track.frames[index].fitted.clone().restore();
-        let display = &self.shot.viewing.display;
-        let light = rgb_cd_m2.iter().flat_map(|&rgb| fitted.map_rgb(rgb));
-        light.map(|value| display.luminance_cd_m2(f64::from(value)) as f32).collect()
+        let light: Vec<_> = rgb_cd_m2.iter().map(|&rgb| fitted.map_rgb(rgb)).collect();
+        self.shot.viewing.display.rgb_cd_m2(&light).into_flattened()
     }
 }
 

@@ -1,6 +1,5 @@
 //! Metrics that no arm optimises: FLIP, ColorVideoVDP, relative mean squared error.
 
-use super::truth::displayed_rgb;
 use anyhow::{Context, Result};
 use colorvideovdp::{Color, Cvvdp, DisplayModel, Execution, Geometry, Image, Options, Photometry};
 use fechner_perception::{Display, Eotf};
@@ -36,7 +35,7 @@ pub fn measure(display: &Display, width: usize, reference: &[[f32; 3]], picture:
         display.pixels_per_degree as f32,
     )?;
     let image = |picture: &[[f32; 3]]| {
-        let light = displayed_rgb(display, picture).into_iter().flatten().collect();
+        let light = display.rgb_cd_m2(picture).into_iter().flatten().collect();
         Image::new(width, height, 3, light)
     };
     let prediction = color_video_vdp(display, [width, height])?

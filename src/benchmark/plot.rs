@@ -2,6 +2,7 @@
 
 use super::arm::Arm;
 use super::curve::{Curve, CurvePoint};
+use crate::digits::significant;
 use std::fmt::Write as _;
 
 const WIDTH: f64 = 400.0;
@@ -74,18 +75,6 @@ fn class(arm: Arm) -> &'static str {
     }
 }
 
-fn in_short(value: f64) -> String {
-    if value >= 100.0 || value == 0.0 {
-        format!("{value:.0}")
-    } else if value >= 1.0 {
-        format!("{value:.2}")
-    } else if value >= 0.01 {
-        format!("{value:.3}")
-    } else {
-        format!("{value:.1e}")
-    }
-}
-
 /// Plots of every metric over samples and over time, with a line at v\*, `target`.
 pub(super) fn plots(curves: &[&Curve], target: f64) -> String {
     let metrics = [(VISIBILITY, Some(target)), (FLIP, None), (JOD, None), (RELMSE, None)];
@@ -117,7 +106,7 @@ impl Frame {
         let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
         let mut text = String::new();
         for tick in self.x.ticks() {
-            let (x, label) = (self.left_of(tick), in_short(tick));
+            let (x, label) = (self.left_of(tick), significant(tick, 3));
             let _ = write!(
                 text,
                 "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{bottom}\"/>\
@@ -126,7 +115,7 @@ impl Frame {
             );
         }
         for tick in self.y.ticks() {
-            let (y, label) = (self.top_of(tick), in_short(tick));
+            let (y, label) = (self.top_of(tick), significant(tick, 3));
             let _ = write!(
                 text,
                 "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{right}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>\

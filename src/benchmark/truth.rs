@@ -32,11 +32,11 @@ impl Truth {
         let display = subject.viewing.display.clone();
         let (width, height) = (reference.width, reference.height);
         let picture: Vec<[f32; 3]> = reference.rgb_cd_m2().into_iter().map(|rgb| tone.map_rgb(rgb)).collect();
-        let displayed = displayed_rgb(&display, &picture);
+        let displayed = display.rgb_cd_m2(&picture);
         let thresholds = colour_thresholds(&displayed, width, height, &subject.viewing)?;
         let halves = reference.halves.each_ref().map(|half| {
             let mapped: Vec<[f32; 3]> = half.iter().map(|&rgb| tone.map_rgb(rgb)).collect();
-            signals(&displayed_rgb(&display, &mapped), width, height)
+            signals(&display.rgb_cd_m2(&mapped), width, height)
         });
         let own_energy = std::array::from_fn(|c| {
             let half_difference = halves[0][c].half_difference(&halves[1][c]);
@@ -60,7 +60,7 @@ impl Truth {
     /// As of noise, which goes on beyond the border: an error that is the same all over the picture is not in it, but
     /// in the bias of its energy.
     pub(crate) fn squared_visibility(&self, picture: &[[f32; 3]]) -> Plane {
-        let shown = signals(&displayed_rgb(&self.display, picture), self.width, self.height);
+        let shown = signals(&self.display.rgb_cd_m2(picture), self.width, self.height);
         let mut most = Plane::filled(self.width, self.height, 0.0);
         let known = self.shown.iter().zip(&self.own_energy).enumerate();
         for (shown, (c, (reference, own_energy))) in shown.iter().zip(known) {
@@ -90,11 +90,6 @@ fn channel(thresholds: &ColourThresholds, channel: usize) -> &ThresholdMap {
 
 fn squared_visibility(thresholds: &ThresholdMap, error: &Plane) -> Plane {
     thresholds.measured_visibility(error).map(|v| v * v)
-}
-
-/// Linear RGB in cd/m² of a display for its light of 0..1.
-pub(super) fn displayed_rgb(display: &Display, picture: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    picture.iter().map(|rgb| rgb.map(|light| display.luminance_cd_m2(f64::from(light)) as f32)).collect()
 }
 
 fn signals(rgb_cd_m2: &[[f32; 3]], width: usize, height: usize) -> [Plane; CHANNELS] {

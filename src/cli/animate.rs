@@ -23,7 +23,7 @@ use fechner::adaptive::settings::DEFAULT_MAX_SAMPLES;
 use fechner::animate::USUAL_FRAMES_PER_SECOND;
 use fechner::film::Film;
 use frames::{Frames, parse_frames};
-use shot::Made;
+use shot::FrameOutcome;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use time::{FrameTimes, ShotClock};
@@ -195,7 +195,7 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
         let started = Instant::now();
         let made = shot.make(frame, &track, clock.as_ref().map(|clock| clock.share(frame)))?;
         times.add(made, started.elapsed());
-        if made != Made::Kept && frame < arguments.frames.last {
+        if made != FrameOutcome::Kept && frame < arguments.frames.last {
             let (done, count) = (frame - arguments.frames.first + 1, arguments.frame_numbers().count());
             say!("{done} of {count} frames, about {} left", duration_in_words(times.seconds_left()));
         }

@@ -4,6 +4,7 @@ mod film;
 
 use anyhow::{Context, anyhow, bail};
 use fechner::checkpoint::{is_checkpoint, read_checkpoint};
+use fechner::digits::significant;
 use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, SampleType, read_exr_channels};
 use fechner::hdr_read::{is_xyze, with_known_header};
 use fechner::jpeg_read;
@@ -78,28 +79,14 @@ impl Range {
         let _ = write!(
             text,
             "  {name:width$}  {kind:5}  {:>12}  {:>12}  {:>12}",
-            short(*min),
-            short(*mean as f32),
-            short(*max)
+            significant((*min).into(), 6),
+            significant(*mean, 6),
+            significant((*max).into(), 6)
         );
         if *nonfinite > 0 {
             let _ = write!(text, "  and {nonfinite} not finite");
         }
         text.push('\n');
-    }
-}
-
-/// Six significant digits without a tail of zeros.
-fn short(value: f32) -> String {
-    let size = value.abs();
-    if size == 0.0 {
-        "0".to_owned()
-    } else if !(1e-4..1e7).contains(&size) {
-        format!("{value:.4e}")
-    } else {
-        let digits = (5 - size.log10().floor() as i32).max(0) as usize;
-        let text = format!("{value:.digits$}");
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
     }
 }
 
@@ -362,15 +349,6 @@ mod tests {
             assert!(message(name).contains(name), "{}", message(name));
             std::fs::write(folder.path().join(name), "rubbish").unwrap();
             assert!(message(name).contains("damaged or no"), "{}", message(name));
-        }
-    }
-
-    #[test]
-    fn numbers_are_short() {
-        for (value, text) in
-            [(0.0, "0"), (1.0, "1"), (1024.0, "1024"), (0.1, "0.1"), (1e9, "1.0000e9"), (1234.5678, "1234.57")]
-        {
-            assert_eq!(short(value), text);
         }
     }
 }

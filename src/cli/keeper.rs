@@ -12,7 +12,7 @@ use fechner::adaptive::state::RenderState;
 use fechner::checkpoint::{Header, write_checkpoint};
 use fechner::output::OutputError;
 use fechner::poison::Unpoisoned as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -55,11 +55,12 @@ struct History {
 }
 
 impl Keeper {
-    pub(super) fn new(arguments: &CheckpointArguments, header: Header, seeds: SeedsSoFar) -> Self {
+    /// One that keeps a render's film in a file, every so often.
+    pub(super) fn new(path: &Path, every: Duration, header: Header, seeds: SeedsSoFar) -> Self {
         let now = Instant::now();
         Self {
-            path: arguments.checkpoint.clone().unwrap_or_default(),
-            every: arguments.checkpoint_every,
+            path: path.to_owned(),
+            every,
             header,
             seeds,
             traced: AtomicU64::new(0),
@@ -195,8 +196,7 @@ mod tests {
     fn what_fails_is_kept() {
         let folder = tempfile::tempdir().expect("a folder");
         let film = folder.path().join("film");
-        let arguments = CheckpointArguments { checkpoint: Some(film.clone()), checkpoint_every: EVERY, resume: false };
-        let keeper = Keeper::new(&arguments, header(), SeedsSoFar::of_one(0));
+        let keeper = Keeper::new(&film, EVERY, header(), SeedsSoFar::of_one(0));
         let watch = Watch::new(Arc::default(), Console::new(None), Some(keeper), None, None);
         watch.failed(&RenderState::new(1, 1, &Limits::of_visibility(1.0)));
         read_checkpoint(&film).expect("kept");
@@ -206,10 +206,8 @@ mod tests {
     /// is not, the tracer's own.
     #[test]
     fn batches_are_short_where_a_film_is_kept_often() {
-        let of = |every: Duration| {
-            let arguments = CheckpointArguments { checkpoint: None, checkpoint_every: every, resume: false };
-            Keeper::new(&arguments, header(), SeedsSoFar::of_one(0))
-        };
+        let folder = tempfile::tempdir().expect("a folder");
+        let of = |every: Duration| Keeper::new(&folder.path().join("film"), every, header(), SeedsSoFar::of_one(0));
         let often = of(Duration::from_secs(16));
         assert_eq!((often.most_samples_a_batch(), of(EVERY).most_samples_a_batch()), (MIN_BATCH, u64::MAX));
         let tell = |pace: f64, longest_write: Duration| {
@@ -231,12 +229,7 @@ mod tests {
     #[test]
     fn a_failure_is_no_reason_to_hurry() {
         let folder = tempfile::tempdir().expect("a folder");
-        let arguments = CheckpointArguments {
-            checkpoint: Some(folder.path().join("gone/film")),
-            checkpoint_every: EVERY,
-            resume: false,
-        };
-        let mut keeper = Keeper::new(&arguments, header(), SeedsSoFar::of_one(0));
+        let mut keeper = Keeper::new(&folder.path().join("gone/film"), EVERY, header(), SeedsSoFar::of_one(0));
         let state = RenderState::new(1, 1, &Limits::of_visibility(1.0));
         let tried_at = |keeper: &Keeper| keeper.history.lock().expect("one thread").last_snapshot;
         // Whether it was tried.

@@ -225,7 +225,7 @@ impl InputPicture {
                 *rgb = rgb.map(|light| light + (1.0 - held));
             }
         }
-        in_cd_m2(shown, &viewing.display)
+        viewing.display.rgb_cd_m2(&shown)
     }
 
     /// Linear display RGB, 0 the display's black and 1 its white; `map` brings a scene there.
@@ -316,7 +316,7 @@ impl InputPicture {
         viewing: &Viewing,
         map: Mapping,
     ) -> Vec<[f32; 3]> {
-        in_cd_m2(self.relative_rgb(tone, &viewing.display, map), &viewing.display)
+        viewing.display.rgb_cd_m2(&self.relative_rgb(tone, &viewing.display, map))
     }
 
     fn luminance_of(&self, relative: &[[f32; 3]], display: &Display) -> Plane {
@@ -326,11 +326,6 @@ impl InputPicture {
             display.luminance_cd_m2(f64::from(luminance(shown))) as f32
         })
     }
-}
-
-fn in_cd_m2(relative: Vec<[f32; 3]>, display: &Display) -> Vec<[f32; 3]> {
-    let cd_m2 = |light: f32| display.luminance_cd_m2(f64::from(light)) as f32;
-    relative.into_iter().map(|rgb| rgb.map(cd_m2)).collect()
 }
 
 /// Light of other primaries, 0 to 1, in those of Rec.709: what they do not reach is brought in at the luminance that it
@@ -369,7 +364,8 @@ mod tests {
         let light = [[0.0, 0.0, 0.0], [0.5, 0.1, 0.02], [0.001, 0.2, 0.9], [1.0, 1.0, 1.0]];
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("a.png");
-        output::write_pq_png(&file, 4, 1, &light, &viewing.display).expect("written");
+        output::write_png_for(&file, &output::DisplayedPicture::opaque((4, 1), &light), &viewing.display)
+            .expect("written");
         let picture = InputPicture::read(&file, None).expect("read");
         let cd_m2 = |relative: f32| viewing.display.luminance_cd_m2(f64::from(relative)) as f32;
         let close = |found: f32, meant: f32| assert!((found - meant).abs() < 2e-3 * meant, "{found}, not {meant}");

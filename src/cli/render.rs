@@ -153,12 +153,12 @@ fn begin(
 ) -> anyhow::Result<Begun> {
     let Crop { width, height, .. } = trace.film_area();
     let fresh = RenderState::new(width, height, &settings.limits);
-    let Some(origin) = origin else {
+    let (Some(origin), Some(path)) = (origin, arguments.checkpoint.file()) else {
         return Ok(Begun { state: fresh, seeds: SeedsSoFar::of_one(trace.seed), keeper: None });
     };
     let header = Header::begun(origin, trace.seed, record, settings.limits.last_rung());
     let Start { header, state, seeds } = arguments.checkpoint.start(header, fresh, settings)?;
-    let keeper = Keeper::new(&arguments.checkpoint, header, seeds.clone());
+    let keeper = Keeper::new(path, arguments.checkpoint.every(), header, seeds.clone());
     Ok(Begun { state, seeds, keeper: Some(keeper) })
 }
 

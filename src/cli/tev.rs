@@ -46,43 +46,43 @@ impl TevArguments {
 /// A render whose states tev is shown.
 pub(super) struct Showing {
     nits_per_unit: f64,
-    moving: Mutex<Moving>,
+    inner: Mutex<Inner>,
 }
 
-struct Moving {
+struct Inner {
     tev: Tev,
     looked: Option<Looked>,
 }
 
 impl Showing {
     pub(super) fn new(tev: Tev, nits_per_unit: f64) -> Self {
-        Self { nits_per_unit, moving: Mutex::new(Moving { tev, looked: None }) }
+        Self { nits_per_unit, inner: Mutex::new(Inner { tev, looked: None }) }
     }
 
-    fn moving(&self) -> MutexGuard<'_, Moving> {
-        self.moving.lock().unpoisoned()
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unpoisoned()
     }
 
     /// Keeps what a look saw. Called after each look.
     pub(super) fn judged(&self, judgement: &Judgement) {
-        self.moving().looked = Some(Looked::of(judgement));
+        self.inner().looked = Some(Looked::of(judgement));
     }
 
     /// Shows the picture if it is time to. Called between batches.
     pub(super) fn between_batches(&self, state: &RenderState) {
-        let mut moving = self.moving();
-        if moving.tev.is_due() {
-            self.show(&mut moving, state, Stage::UnderWay);
+        let mut inner = self.inner();
+        if inner.tev.is_due() {
+            self.show(&mut inner, state, Stage::UnderWay);
         }
     }
 
     /// Shows the finished picture. Called at the end.
     pub(super) fn ended(&self, state: &RenderState) {
-        self.show(&mut self.moving(), state, Stage::AtRest);
+        self.show(&mut self.inner(), state, Stage::AtRest);
     }
 
-    fn show(&self, moving: &mut Moving, state: &RenderState, stage: Stage) {
-        let Moving { tev, looked } = moving;
+    fn show(&self, inner: &mut Inner, state: &RenderState, stage: Stage) {
+        let Inner { tev, looked } = inner;
         let (film, nits_per_unit) = (&state.film, self.nits_per_unit);
         let raw = || {
             let pixels = film.pixel_count();

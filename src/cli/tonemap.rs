@@ -15,7 +15,7 @@ use clap::{Args, ValueEnum};
 use fechner::animate::USUAL_FRAMES_PER_SECOND;
 use fechner::json_file;
 use fechner::output::covered::Covered;
-use fechner::output::{self, PartOf, PictureFormat, Shown};
+use fechner::output::{self, DisplayedPicture, PartOf, PictureFormat};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
     ToneSettings, map_picture,
@@ -303,13 +303,13 @@ fn run_all(
     }
     let frame = SceneFrame::read(&arguments.input[0], arguments, viewing)?;
     let sheet = sheet::of_all_operators(&frame, &frame.viewing, settings);
-    let picture = Shown {
+    let picture = DisplayedPicture {
         size: (sheet.width as u32, sheet.height as u32),
         rgb_linear_display: &sheet.rgb,
         alpha: None,
         pixel_aspect_ratio: frame.pixel_aspect_ratio,
     };
-    output::write_shown_png(&targets[0], &picture, &viewing.display)?;
+    output::write_png_for(&targets[0], &picture, &viewing.display)?;
     Ok(())
 }
 

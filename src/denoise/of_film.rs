@@ -135,6 +135,19 @@ mod tests {
     use crate::integrator::{BlockWork, FirstHit, PathSample};
     use crate::sampler::{hash_words, unit_of_hash};
 
+    /// A denoiser; `None`, with a message, where it is not installed and nobody says that it is.
+    fn installed(kind: DenoiserKind) -> Option<Denoiser> {
+        let is_required = std::env::var_os("FECHNER_REQUIRE_OIDN").is_some();
+        match Denoiser::open(kind) {
+            Ok(denoiser) => Some(denoiser),
+            Err(error) if is_required => panic!("{error}"),
+            Err(error) => {
+                eprintln!("{kind:?} is skipped: {error}");
+                None
+            }
+        }
+    }
+
     const SIDE: u32 = 48;
 
     /// A film of so many samples in each half of every pixel.
@@ -187,10 +200,7 @@ mod tests {
             of_wall(albedo, albedo)
         });
         for kind in [DenoiserKind::Builtin, DenoiserKind::Oidn] {
-            let Ok(denoiser) = Denoiser::open(kind) else {
-                eprintln!("{kind:?} is skipped: not installed");
-                continue;
-            };
+            let Some(denoiser) = installed(kind) else { continue };
             let DenoisedFilm { rgb_cd_m2, halves_rgb_cd_m2: [a, b], .. } =
                 denoise_film(&denoiser, &film, 1.0).expect("denoises");
             let rms = |error: &dyn Fn(usize) -> f32| {
@@ -222,7 +232,7 @@ mod tests {
     fn black_stays_black() {
         let film = film_of(8, |_, _, _| of_wall(Vec3::ONE, Vec3::ZERO));
         for kind in [DenoiserKind::Builtin, DenoiserKind::Oidn] {
-            let Ok(denoiser) = Denoiser::open(kind) else { continue };
+            let Some(denoiser) = installed(kind) else { continue };
             let denoised = denoise_film(&denoiser, &film, 1.0).expect("denoises");
             assert!(denoised.rgb_cd_m2.iter().flatten().all(|&value| value == 0.0), "{kind:?}");
         }
@@ -247,10 +257,7 @@ mod tests {
     fn lamps_have_no_halos() {
         let film = wall_and_lamp();
         for kind in [DenoiserKind::Builtin, DenoiserKind::Oidn] {
-            let Ok(denoiser) = Denoiser::open(kind) else {
-                eprintln!("{kind:?} is skipped: not installed");
-                continue;
-            };
+            let Some(denoiser) = installed(kind) else { continue };
             let DenoisedFilm { rgb_cd_m2, halves_rgb_cd_m2, .. } =
                 denoise_film(&denoiser, &film, 1.0).expect("denoises");
             for picture in [&rgb_cd_m2, &halves_rgb_cd_m2[0], &halves_rgb_cd_m2[1]] {

@@ -30,7 +30,7 @@ pub const THRESHOLD: &str = "threshold.Y";
 pub const ADAPTATION: &str = "adaptation.Y";
 /// How visible the noise is.
 pub const VISIBILITY: &str = "visibility.Y";
-/// Where it will be in the next frame, less where it is, in pixels.
+/// Place of the surface's point in the next frame less that in this one, in pixels.
 pub const VELOCITY: [&str; 2] = ["velocity.X", "velocity.Y"];
-/// Where it was in the frame before, less where it is, in pixels.
+/// Place of the surface's point in the frame before less that in this one, in pixels.
 pub const VELOCITY_TO_PREVIOUS: [&str; 2] = ["velocity_previous.X", "velocity_previous.Y"];

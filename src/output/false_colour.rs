@@ -1,5 +1,6 @@
 //! Values of a picture as colours, for people to look at: maps of samples, thresholds and visibility.
 
+use crate::digits::significant;
 use fechner_perception::Plane;
 
 /// A layer in colours: 8 bits, RGB after RGB, and what the colours mean.
@@ -120,14 +121,9 @@ fn heat8(share: f64) -> [u8; 3] {
     heat(share).map(|code| (255.0 * code).round() as u8)
 }
 
-/// Three significant digits.
+/// A number of a legend.
 pub(crate) fn figure(value: f64) -> String {
-    match value.abs() {
-        v if (100.0..1e6).contains(&v) => format!("{value:.0}"),
-        v if (1.0..100.0).contains(&v) => format!("{}", (value * 100.0).round() / 100.0),
-        v if (0.001..1.0).contains(&v) => format!("{}", (value * 1e4).round() / 1e4),
-        _ => format!("{value:.2e}"),
-    }
+    significant(value, 3)
 }
 
 #[cfg(test)]

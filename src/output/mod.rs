@@ -28,10 +28,7 @@ pub use exr_file::write_exr;
 pub use frame_rate::FRAMES_PER_SECOND;
 pub(crate) use frame_rate::fraction;
 pub use picture_format::PictureFormat;
-pub use png_file::{
-    Shown, encode_srgb8, write_codes_png, write_png, write_png_for, write_png_with_alpha_for, write_pq_png,
-    write_shown_png,
-};
+pub use png_file::{DisplayedPicture, encode_srgb8, write_codes_png, write_png, write_png_for};
 pub(crate) use png_read::{PROFILE_NOT_READ, names_srgb};
 pub use png_read::{PngColour, PngTransfer, decode_pq, png_colour, png_pixel_aspect_ratio};
 

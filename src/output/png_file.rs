@@ -10,49 +10,11 @@ use rayon::prelude::*;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Writes linear display RGB, where 0 is the display's black and 1 its white, as the display wants it: [`write_pq_png`]
-/// for one of SMPTE ST 2084, [`write_png`] for all others, which colour management brings to them.
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn write_png_for(
-    path: &Path,
-    width: u32,
-    height: u32,
-    rgb_linear_display: &[[f32; 3]],
-    display: &Display,
-) -> Result<(), OutputError> {
-    match display.eotf {
-        Eotf::Pq => write_pq_png(path, width, height, rgb_linear_display, display),
-        Eotf::Srgb | Eotf::Bt1886 | Eotf::Linear => write_png(path, width, height, rgb_linear_display),
-    }
-}
-
 /// Fast: the default takes a third of the time of a tone-mapped picture of 1920×1080.
 const COMPRESSION: png::Compression = png::Compression::Fast;
 
 /// Code points of ITU-T H.273: primaries of BT.2020, transfer of SMPTE ST 2084 (PQ), RGB, full range.
 const CICP_BT2020_PQ: [u8; 4] = [9, 16, 0, 1];
-
-/// Writes what the display emits as a 16-bit PNG in PQ code values and Rec.2020 primaries, with the cICP chunk (PNG,
-/// third edition) that says so.
-///
-/// Values are absolute: `rgb_linear_display` of 0 is the display's black, 1 its white, both in cd/m². What the screen
-/// reflects of the room is not in the codes, since it adds that by itself. NaN becomes black.
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn write_pq_png(
-    path: &Path,
-    width: u32,
-    height: u32,
-    rgb_linear_display: &[[f32; 3]],
-    display: &Display,
-) -> Result<(), OutputError> {
-    check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
-    let bytes = encode_pq16(rgb_linear_display, display);
-    write_samples(path, (width, height), 1.0, png::ColorType::Rgb, Codes::Pq16, &bytes)
-}
 
 /// How samples are coded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,7 +66,9 @@ fn tag_as_srgb<W: Write>(encoder: &mut png::Encoder<'_, W>) {
     encoder.set_source_chromaticities(png::SourceChromaticities::new(white, red, green, blue));
 }
 
-/// The bytes of [`write_pq_png`]: big-endian, RGB after RGB.
+/// What the display emits, as PQ codes of 16 bits in Rec.2020's primaries: big-endian, RGB after RGB. Values are
+/// absolute: 0 is the display's black, 1 its white, both in cd/m². What the screen reflects of the room is not in the
+/// codes, since it adds that by itself. NaN becomes black.
 fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
     let wide = Primaries::REC709.to(&Primaries::REC2020).unwrap_or(IDENTITY);
     let mut bytes = vec![0; rgb_linear_display.len() * 6];
@@ -140,9 +104,9 @@ pub fn write_codes_png(path: &Path, width: u32, height: u32, rgb8: &[u8]) -> Res
     write_samples(path, (width, height), 1.0, png::ColorType::Rgb, Codes::Srgb8, rgb8)
 }
 
-/// A picture that is a PNG's in all but its bytes.
+/// A picture for a display.
 #[derive(Clone, Copy, Debug)]
-pub struct Shown<'a> {
+pub struct DisplayedPicture<'a> {
     /// Columns and rows.
     pub size: (u32, u32),
     /// Linear display RGB, row by row: 0 is the display's black and 1 its white.
@@ -153,28 +117,21 @@ pub struct Shown<'a> {
     pub pixel_aspect_ratio: f64,
 }
 
-/// [`write_png_for`] with an alpha in [0, 1] a pixel, by which the colours are not multiplied.
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn write_png_with_alpha_for(
-    path: &Path,
-    width: u32,
-    height: u32,
-    rgb_linear_display: &[[f32; 3]],
-    alpha: &[f32],
-    display: &Display,
-) -> Result<(), OutputError> {
-    let size = (width, height);
-    write_shown_png(path, &Shown { size, rgb_linear_display, alpha: Some(alpha), pixel_aspect_ratio: 1.0 }, display)
+impl<'a> DisplayedPicture<'a> {
+    /// One of square pixels that are all covered.
+    pub fn opaque(size: (u32, u32), rgb_linear_display: &'a [[f32; 3]]) -> Self {
+        Self { size, rgb_linear_display, alpha: None, pixel_aspect_ratio: 1.0 }
+    }
 }
 
-/// [`write_png_for`] of a picture that may have an alpha, and pixels that are not square, which its chunk pHYs says.
+/// Writes a picture as the display wants it: as 16-bit PQ codes of Rec.2020, with the cICP chunk (PNG, third edition)
+/// that says so, for one of SMPTE ST 2084; as [`write_png`] does for all others, which colour management brings to
+/// them. Pixels that are not square are said in the chunk pHYs.
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write_shown_png(path: &Path, picture: &Shown<'_>, display: &Display) -> Result<(), OutputError> {
-    let Shown { size: (width, height), rgb_linear_display, alpha, pixel_aspect_ratio } = *picture;
+pub fn write_png_for(path: &Path, picture: &DisplayedPicture<'_>, display: &Display) -> Result<(), OutputError> {
+    let DisplayedPicture { size: (width, height), rgb_linear_display, alpha, pixel_aspect_ratio } = *picture;
     let counts = [Some(("the picture", rgb_linear_display.len())), alpha.map(|alpha| ("alpha", alpha.len()))];
     check_size(path, width, height, &counts.into_iter().flatten().collect::<Vec<_>>())?;
     let color = if alpha.is_some() { png::ColorType::Rgba } else { png::ColorType::Rgb };
@@ -301,7 +258,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let display = Display::preset("hdr-1000").unwrap();
-        write_png_for(&path, 3, 1, &[[1.0; 3], [0.0, f32::NAN, 0.0], [0.1, 0.0, 0.0]], &display).unwrap();
+        let light = [[1.0; 3], [0.0, f32::NAN, 0.0], [0.1, 0.0, 0.0]];
+        write_png_for(&path, &DisplayedPicture::opaque((3, 1), &light), &display).unwrap();
         let colour = png_colour(&std::fs::read(&path).unwrap());
         assert_eq!((colour.transfer, colour.primaries), (PngTransfer::Pq, Some(Primaries::REC2020)));
         let names = chunk_names(&std::fs::read(&path).unwrap());
@@ -335,8 +293,10 @@ mod tests {
             reader.next_frame(&mut bytes).unwrap();
             (tag, bytes)
         };
-        write_png_for(&folder.path().join("a.png"), 2, 1, &light, &display).unwrap();
-        write_png_with_alpha_for(&folder.path().join("b.png"), 2, 1, &light, &[1.0, 0.0], &display).unwrap();
+        let opaque = DisplayedPicture::opaque((2, 1), &light);
+        let covering = DisplayedPicture { alpha: Some(&[1.0, 0.0]), ..opaque };
+        write_png_for(&folder.path().join("a.png"), &opaque, &display).unwrap();
+        write_png_for(&folder.path().join("b.png"), &covering, &display).unwrap();
         let ((_, opaque), (tag, bytes)) = (read("a.png"), read("b.png"));
         assert_eq!((tag, bytes.len()), (Some(16), 16));
         assert_eq!((&bytes[..6], &bytes[6..8]), (&opaque[..6], &[255, 255][..]));
@@ -350,8 +310,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let read = |display: &str, alpha: Option<&[f32]>, pixel_aspect_ratio: f64| {
-            let shown = Shown { size: (1, 1), rgb_linear_display: &[[0.5; 3]], alpha, pixel_aspect_ratio };
-            write_shown_png(&path, &shown, &Display::preset(display).unwrap()).unwrap();
+            let shown = DisplayedPicture { alpha, pixel_aspect_ratio, ..DisplayedPicture::opaque((1, 1), &[[0.5; 3]]) };
+            write_png_for(&path, &shown, &Display::preset(display).unwrap()).unwrap();
             png_pixel_aspect_ratio(&std::fs::read(&path).unwrap())
         };
         for display in ["desktop", "hdr-1000"] {

@@ -2,7 +2,7 @@
 
 use super::covered::Covered;
 use super::{
-    Attribute, NITS_PER_UNIT, OutputError, PartOf, Picture, channel, write_exr, write_png_for, write_png_with_alpha_for,
+    Attribute, DisplayedPicture, NITS_PER_UNIT, OutputError, PartOf, Picture, channel, write_exr, write_png_for,
 };
 use crate::adaptive::Rendered;
 use crate::adaptive::settings::LoopSettings;
@@ -43,14 +43,15 @@ pub fn write_display_png(
     match background {
         Background::Shown => {
             let shown = map_picture(tone, width as usize, picture);
-            write_png_for(path, width, height, &shown, display)?;
+            write_png_for(path, &DisplayedPicture::opaque((width, height), &shown), display)?;
             Ok(false)
         }
         Background::Transparent => {
             let coverage = rendered.film.coverage();
             let covered = Covered::of(tone, map_picture, width as usize, picture, &coverage);
             let (shown, alpha) = covered.straight();
-            write_png_with_alpha_for(path, width, height, &shown, &alpha, display)?;
+            let opaque = DisplayedPicture::opaque((width, height), &shown);
+            write_png_for(path, &DisplayedPicture { alpha: Some(&alpha), ..opaque }, display)?;
             Ok(covered.has_light_in_front())
         }
     }

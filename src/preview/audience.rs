@@ -30,11 +30,11 @@ const REFUSAL: Duration = Duration::from_secs(6);
 pub struct Audience<'a> {
     shared: Arc<Shared>,
     settings: &'a LoopSettings,
-    moving: Mutex<Moving>,
+    inner: Mutex<Inner>,
     server: Mutex<Option<JoinHandle<std::io::Result<()>>>>,
 }
 
-struct Moving {
+struct Inner {
     screen: Screen,
     pace: Pace,
     progress: Option<Progress>,
@@ -45,7 +45,7 @@ struct Moving {
     is_stopped_here: bool,
 }
 
-impl Moving {
+impl Inner {
     /// Says that a wish cannot be met, or after a while nothing of it.
     fn refuse(&mut self, refused: Option<Instant>, shared: &Shared) {
         let told = "this is a running render: it can be stopped; \"fechner view\" opens one to drive";
@@ -73,7 +73,7 @@ impl<'a> Audience<'a> {
             std::thread::Builder::new().name("viewers".to_owned()).spawn(move || serve(listener, door, of_server))?;
         let blank = blank_status(scene, settings, &record.operator, &Held::at_home(&scene.camera));
         let status = Status { phase: Phase::Rendering, exposure: record.exposure_stops, is_driven: false, ..blank };
-        let moving = Moving {
+        let inner = Inner {
             screen: Screen::new(Arc::default()),
             pace: Pace::new(),
             progress: None,
@@ -81,94 +81,94 @@ impl<'a> Audience<'a> {
             refused: None,
             is_stopped_here: false,
         };
-        Ok(Self { shared, settings, moving: Mutex::new(moving), server: Mutex::new(Some(server)) })
+        Ok(Self { shared, settings, inner: Mutex::new(inner), server: Mutex::new(Some(server)) })
     }
 
-    fn moving(&self) -> MutexGuard<'_, Moving> {
-        self.moving.lock().unpoisoned()
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unpoisoned()
     }
 
-    fn show(&self, moving: &mut Moving, state: &RenderState) {
-        let stage = if moving.status.phase == Phase::Stopped { Stage::AtRest } else { Stage::UnderWay };
+    fn show(&self, inner: &mut Inner, state: &RenderState) {
+        let stage = if inner.status.phase == Phase::Stopped { Stage::AtRest } else { Stage::UnderWay };
         // The film stands in for itself where it has no samples yet.
         let (film, tone, settings) = (&state.film, state.tone.as_ref(), self.settings);
-        moving.screen.show(Scenery { film, tone, settings, stage, step: 1 }, &self.shared);
-        (moving.status.width, moving.status.height) = (film.width(), film.height());
-        let total_samples = moving.screen.total_samples;
-        count(&mut moving.status, state, total_samples, moving.progress.as_ref());
-        publish(&moving.status, &self.shared);
+        inner.screen.show(Scenery { film, tone, settings, stage, step: 1 }, &self.shared);
+        (inner.status.width, inner.status.height) = (film.width(), film.height());
+        let total_samples = inner.screen.total_samples;
+        count(&mut inner.status, state, total_samples, inner.progress.as_ref());
+        publish(&inner.status, &self.shared);
     }
 
     /// Keeps the progress that is told after each look at the picture.
     pub fn looked(&self, progress: &Progress) {
-        self.moving().progress = Some(*progress);
+        self.inner().progress = Some(*progress);
     }
 
     /// Keeps what was seen after each look.
     pub fn judged(&self, state: &RenderState, judgement: &Judgement) {
-        let mut moving = self.moving();
-        moving.screen.looked = Some(Arc::new(Looked::of(judgement)));
-        self.show(&mut moving, state);
-        moving.pace.begin();
+        let mut inner = self.inner();
+        inner.screen.looked = Some(Arc::new(Looked::of(judgement)));
+        self.show(&mut inner, state);
+        inner.pace.begin();
     }
 
     /// While a plan is traced.
     pub fn samples_done(&self, samples: u64) {
-        self.moving().pace.count(samples);
+        self.inner().pace.count(samples);
     }
 
     /// Most samples between two moments.
     pub fn most_samples_a_batch(&self) -> u64 {
-        self.moving().pace.samples()
+        self.inner().pace.samples()
     }
 
     /// Shows the film if a frame is due, and says whether somebody wants the render to stop.
     pub fn between_batches(&self, state: &RenderState) -> Directive {
-        let mut moving = self.moving();
-        let between_frames = moving.screen.between_frames(&self.shared);
-        moving.pace.counted(between_frames);
+        let mut inner = self.inner();
+        let between_frames = inner.screen.between_frames(&self.shared);
+        inner.pace.counted(between_frames);
         let mut directive = Directive::GoOn;
-        let mut wants_a_frame = moving.screen.is_due(between_frames);
+        let mut wants_a_frame = inner.screen.is_due(between_frames);
         for command in self.shared.take_commands() {
             match command {
                 Command::Stop => {
                     directive = Directive::Stop;
-                    moving.is_stopped_here = true;
+                    inner.is_stopped_here = true;
                 }
                 Command::Redraw => wants_a_frame = true,
-                _ => moving.refuse(Some(Instant::now()), &self.shared),
+                _ => inner.refuse(Some(Instant::now()), &self.shared),
             }
         }
-        if moving.refused.is_some_and(|refused| refused.elapsed() >= REFUSAL) {
-            moving.refuse(None, &self.shared);
+        if inner.refused.is_some_and(|refused| refused.elapsed() >= REFUSAL) {
+            inner.refuse(None, &self.shared);
         }
         if wants_a_frame {
-            self.show(&mut moving, state);
+            self.show(&mut inner, state);
         }
-        moving.pace.begin();
+        inner.pace.begin();
         directive
     }
 
     /// The render is at an end: shows its last frame, says why, and sends everybody away, so that no connection takes a
     /// file from what is written next.
     pub fn ended(&self, state: &RenderState, reason: StopReason) {
-        let mut moving = self.moving();
-        moving.status.phase = Phase::Stopped;
-        moving.status.reason = Some(match reason {
-            StopReason::Interrupted if moving.is_stopped_here => "stopped from this page",
+        let mut inner = self.inner();
+        inner.status.phase = Phase::Stopped;
+        inner.status.reason = Some(match reason {
+            StopReason::Interrupted if inner.is_stopped_here => "stopped from this page",
             StopReason::Interrupted => "stopped by a signal",
             reason => in_words(reason),
         });
-        self.show(&mut moving, state);
+        self.show(&mut inner, state);
         self.close();
     }
 
     /// The render failed: shows what there is, says so, and sends everybody away.
     pub fn failed(&self, state: &RenderState) {
-        let mut moving = self.moving();
-        moving.status.phase = Phase::Stopped;
-        moving.status.error = Some("the render failed: why is said where it was started".to_owned());
-        self.show(&mut moving, state);
+        let mut inner = self.inner();
+        inner.status.phase = Phase::Stopped;
+        inner.status.error = Some("the render failed: why is said where it was started".to_owned());
+        self.show(&mut inner, state);
         self.close();
     }
 

@@ -40,7 +40,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 pub(super) use telling::{blank_status, count, in_words, publish};
-use watch::{Moving, Watch};
+use watch::{Inner, Watch};
 
 /// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved
 /// scene file starts it again.
@@ -234,7 +234,7 @@ impl<'a> Session<'a> {
                 settings: &self.settings,
                 follower: self.gaze.as_ref(),
                 is_awaited: !self.waiting.is_empty(),
-                moving: Mutex::new(Moving {
+                inner: Mutex::new(Inner {
                     screen: &mut self.screen,
                     glimpse: &mut self.glimpse,
                     pace: &mut self.pace,

@@ -28,7 +28,8 @@ fn maps_show_counts_and_what_can_be_seen() {
     let is_blue = |picture: &image::RgbImage| picture.pixels().all(|pixel| pixel.0[0] == 0);
     assert!(is_blue(&map("visibility", &["--visibility", "1000"])));
     assert!(!is_blue(&map("visibility", &["--visibility", "0.01", "--spp", "16"])));
-    map("threshold", &["--spp", "16"]);
+    let thresholds = map("threshold", &["--spp", "16"]);
+    assert!(thresholds.pixels().any(|pixel| pixel != thresholds.get_pixel(0, 0)), "one threshold everywhere");
 }
 
 /// Of one sample a pixel nothing is known, which was shown as the most visible noise.

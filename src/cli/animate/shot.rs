@@ -194,14 +194,14 @@ impl<'a> Shot<'a> {
     }
 
     /// Renders a frame, unless it is there. `time` is a limit of the frame's own, beside those of the shot.
-    pub(super) fn make(&self, frame: u32, track: &Track, time: Option<Duration>) -> Result<Made> {
+    pub(super) fn make(&self, frame: u32, track: &Track, time: Option<Duration>) -> Result<FrameOutcome> {
         let mut job = self.frame(frame, track)?;
         job.settings.limits.time = time;
         let file = self.file(frame);
         if self.record(frame, &job.key).is_some() {
             say!("{}: is there", file.display());
             remove_leftovers_of_frame(&file);
-            return Ok(Made::Kept);
+            return Ok(FrameOutcome::Kept);
         }
         let outdated = self.has_record(frame);
         match FrameRecord::of_another_picture(&file) {
@@ -215,7 +215,7 @@ impl<'a> Shot<'a> {
         let made = render_frame(&job.scenes, &self.settings, &mut job.settings, frame, &console)?;
         console.finish();
         self.keep(frame, &job, &made)?;
-        Ok(if outdated { Made::Anew } else { Made::New })
+        Ok(if outdated { FrameOutcome::Anew } else { FrameOutcome::New })
     }
 
     /// What a frame shows.
@@ -313,7 +313,7 @@ fn named_folder(file: &Path) -> Option<&Path> {
 
 /// What came of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Made {
+pub(super) enum FrameOutcome {
     /// The frame was there.
     Kept,
     /// The frame was not there, and was made.

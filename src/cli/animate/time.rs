@@ -3,7 +3,7 @@
 //! Each frame ends between plans, as a still by `--time` does, so what is rendered depends on the machine.
 
 use super::Shot;
-use super::shot::Made;
+use super::shot::FrameOutcome;
 use anyhow::Result;
 use fechner::adaptive::settings::Sampling;
 use fechner::animate::track::Track;
@@ -90,13 +90,13 @@ impl FrameTimes {
     }
 
     /// The next frame is done.
-    pub(super) fn add(&mut self, made: Made, took: Duration) {
+    pub(super) fn add(&mut self, made: FrameOutcome, took: Duration) {
         self.to_come.pop_front();
-        if made != Made::Kept {
+        if made != FrameOutcome::Kept {
             self.rendered += 1;
             self.seconds += took.as_secs_f64();
         }
-        self.any_outdated |= made == Made::Anew;
+        self.any_outdated |= made == FrameOutcome::Anew;
     }
 
     /// Seconds that the frames to come are expected to take.
@@ -114,10 +114,10 @@ mod tests {
     #[test]
     fn frames_that_will_be_kept_take_no_time() {
         let mut times = FrameTimes::new([true, false, true, true, false, true].into_iter());
-        times.add(Made::Kept, Duration::from_secs(100));
-        times.add(Made::New, Duration::from_secs(2));
+        times.add(FrameOutcome::Kept, Duration::from_secs(100));
+        times.add(FrameOutcome::New, Duration::from_secs(2));
         assert_eq!(times.seconds_left(), 2.0);
-        times.add(Made::Anew, Duration::from_secs(4));
+        times.add(FrameOutcome::Anew, Duration::from_secs(4));
         assert_eq!(times.seconds_left(), 9.0);
     }
 

@@ -1,4 +1,4 @@
-//! `farm status`: how far everything is, for people and schedulers. It changes nothing.
+//! `farm status`: how far everything is, for people and schedulers. It changes no result.
 
 use super::absolute;
 use crate::cli::words::{count, samples_in_words};

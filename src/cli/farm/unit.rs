@@ -51,7 +51,7 @@ pub(super) enum IfBusy {
 
 /// How it went with a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Went {
+pub(super) enum UnitOutcome {
     /// Rendered here and now.
     Rendered,
     /// Nothing was to be done.
@@ -86,9 +86,9 @@ pub(super) fn run(arguments: &UnitArguments) -> Result<ExitCode> {
     Worker::with(&arguments.folder, &arguments.keeping, &arguments.threads, |mut worker| {
         for &unit in &arguments.units {
             match worker.render(unit, IfBusy::Wait)? {
-                Went::Rendered | Went::WasThere => {}
-                Went::Left | Went::Busy => return Ok(ExitCode::from(CALL_AGAIN)),
-                Went::HasNoOrder => bail!("unit {unit} has no order: fechner farm merge writes it again"),
+                UnitOutcome::Rendered | UnitOutcome::WasThere => {}
+                UnitOutcome::Left | UnitOutcome::Busy => return Ok(ExitCode::from(CALL_AGAIN)),
+                UnitOutcome::HasNoOrder => bail!("unit {unit} has no order: fechner farm merge writes it again"),
             }
         }
         Ok(ExitCode::SUCCESS)
@@ -120,22 +120,22 @@ impl<'a> Worker<'a> {
     }
 
     /// Renders a unit, unless its result is there.
-    pub(super) fn render(&mut self, unit: u64, if_busy: IfBusy) -> Result<Went> {
+    pub(super) fn render(&mut self, unit: u64, if_busy: IfBusy) -> Result<UnitOutcome> {
         match self.standing(unit) {
             Standing::Open => {}
             Standing::Merged => {
                 say!("unit {unit}: is merged");
-                return Ok(Went::WasThere);
+                return Ok(UnitOutcome::WasThere);
             }
-            Standing::Unknown(_) if if_busy == IfBusy::Skip => return Ok(Went::Busy),
+            Standing::Unknown(_) if if_busy == IfBusy::Skip => return Ok(UnitOutcome::Busy),
             Standing::Unknown(problem) => bail!("unit {unit} is not planned: {problem}"),
         }
         let lock = match self.lock(unit, if_busy) {
             Ok(Some(lock)) => lock,
-            Ok(None) => return Ok(if self.signals.leaves() { Went::Left } else { Went::Busy }),
+            Ok(None) => return Ok(if self.signals.leaves() { UnitOutcome::Left } else { UnitOutcome::Busy }),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 say!("unit {unit}: was merged meanwhile");
-                return Ok(Went::WasThere);
+                return Ok(UnitOutcome::WasThere);
             }
             Err(error) => return Err(error).with_context(|| format!("the lock of unit {unit}")),
         };
@@ -144,8 +144,8 @@ impl<'a> Worker<'a> {
         match went {
             // Another process had it as well, and its result was merged.
             Err(error) => match self.standing(unit) {
-                Standing::Merged => Ok(Went::WasThere),
-                Standing::Unknown(_) if if_busy == IfBusy::Skip => Ok(Went::Busy),
+                Standing::Merged => Ok(UnitOutcome::WasThere),
+                Standing::Unknown(_) if if_busy == IfBusy::Skip => Ok(UnitOutcome::Busy),
                 Standing::Open | Standing::Unknown(_) => Err(error),
             },
             went => went,
@@ -193,17 +193,17 @@ impl<'a> Worker<'a> {
         }
     }
 
-    fn render_locked(&mut self, unit: u64) -> Result<Went> {
+    fn render_locked(&mut self, unit: u64) -> Result<UnitOutcome> {
         let order = match NamedOrder::read(self.farm, unit) {
             Ok(order) => order,
             Err(error) => {
                 self.refuse(&self.farm.unit_file(unit, "order"), &error);
-                return Ok(Went::HasNoOrder);
+                return Ok(UnitOutcome::HasNoOrder);
             }
         };
         if self.is_rendered(&order) {
             say!("unit {unit}: is there");
-            return Ok(Went::WasThere);
+            return Ok(UnitOutcome::WasThere);
         }
         let begun = self.begun(&order);
         self.execute(&order, begun)
@@ -232,7 +232,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Traces what is not begun of an order.
-    fn execute(&mut self, order: &NamedOrder, begun: Option<UnitSums>) -> Result<Went> {
+    fn execute(&mut self, order: &NamedOrder, begun: Option<UnitSums>) -> Result<UnitOutcome> {
         let unit = order.order.unit;
         let there = begun.as_ref().map_or(0, |begun| begun.sums.len());
         if there > 0 {
@@ -246,7 +246,7 @@ impl<'a> Worker<'a> {
         match render_unit(farm, order, begun, tracer, &keeping)? {
             Outcome::Left => {
                 say!("unit {unit}: left by a signal; its checkpoint is there");
-                Ok(Went::Left)
+                Ok(UnitOutcome::Left)
             }
             Outcome::Finished => {
                 say!(
@@ -256,7 +256,7 @@ impl<'a> Worker<'a> {
                     duration_in_words(started.elapsed().as_secs_f64()),
                     duration_in_words(loaded.as_secs_f64())
                 );
-                Ok(Went::Rendered)
+                Ok(UnitOutcome::Rendered)
             }
         }
     }

@@ -1,7 +1,7 @@
 //! `farm work`: one of any number of processes on a folder, which samples, merges and concludes as there is need.
 
 use super::merge::{MergeWent, conclude, merge};
-use super::unit::{IfBusy, KeepingArguments, Went, Worker};
+use super::unit::{IfBusy, KeepingArguments, UnitOutcome, Worker};
 use super::{CALL_AGAIN, Threads, frame_lock};
 use anyhow::{Context, Result};
 use clap::Args;
@@ -50,9 +50,9 @@ pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
                     FrameState::Open { missing, .. } => {
                         for unit in missing {
                             match worker.render(unit, IfBusy::Skip)? {
-                                Went::Rendered => did_something = true,
-                                Went::Left => return Ok(ExitCode::from(CALL_AGAIN)),
-                                Went::WasThere | Went::Busy | Went::HasNoOrder => {}
+                                UnitOutcome::Rendered => did_something = true,
+                                UnitOutcome::Left => return Ok(ExitCode::from(CALL_AGAIN)),
+                                UnitOutcome::WasThere | UnitOutcome::Busy | UnitOutcome::HasNoOrder => {}
                             }
                         }
                     }

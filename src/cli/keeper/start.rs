@@ -46,19 +46,20 @@ pub(in crate::cli) struct Start {
 #[derive(Clone)]
 pub(in crate::cli) struct SeedsSoFar {
     before: Seeds,
-    rays_before: u64,
+    samples_before: u64,
     own: Seeds,
 }
 
 impl SeedsSoFar {
     /// Seeds of a render that begins with nothing.
     pub(in crate::cli) fn of_one(seed: u64) -> Self {
-        Self { before: Seeds::one(seed), rays_before: 0, own: Seeds::one(seed) }
+        Self { before: Seeds::one(seed), samples_before: 0, own: Seeds::one(seed) }
     }
 
     /// The seeds of the film as it is now.
     pub(in crate::cli) fn of(&self, film: &Film) -> &Seeds {
-        if film.rays == self.rays_before { &self.before } else { &self.own }
+        let holds_own_samples = film.total_samples() != self.samples_before;
+        if holds_own_samples { &self.own } else { &self.before }
     }
 }
 
@@ -66,6 +67,11 @@ impl CheckpointArguments {
     /// The file that is asked for.
     pub(in crate::cli) fn file(&self) -> Option<&Path> {
         self.checkpoint.as_deref()
+    }
+
+    /// Time between two of its states.
+    pub(in crate::cli) fn every(&self) -> Duration {
+        self.checkpoint_every
     }
 
     /// Whether there is to be a file.
@@ -133,7 +139,7 @@ impl CheckpointArguments {
             }
             state
         };
-        let seeds = SeedsSoFar { before: found.seeds, rays_before: state.film.rays, own: own.clone() };
+        let seeds = SeedsSoFar { before: found.seeds, samples_before: state.film.total_samples(), own: own.clone() };
         Ok(Start { header: Header { seeds: own, earlier_visibilities, ..header }, state, seeds })
     }
 }
@@ -163,7 +169,11 @@ pub(in crate::cli) fn fit_in(film: &Path, origin: &Origin, record: &SettingsReco
 
 /// From the beginning.
 fn begun(header: Header, state: RenderState) -> Start {
-    let seeds = SeedsSoFar { before: header.seeds.clone(), rays_before: state.film.rays, own: header.seeds.clone() };
+    let seeds = SeedsSoFar {
+        before: header.seeds.clone(),
+        samples_before: state.film.total_samples(),
+        own: header.seeds.clone(),
+    };
     Start { header, state, seeds }
 }
 

@@ -4,7 +4,7 @@ use super::SceneFrame;
 use crate::cli::kept_tone::{LIGHT, OF_DISPLAY};
 use crate::cli::picture::{LIGHT_RAISES_ALPHA, note};
 use anyhow::{Context, Result};
-use fechner::output::{self, Attribute, Picture, PictureFormat, Shown, attribute, channel};
+use fechner::output::{self, Attribute, DisplayedPicture, Picture, PictureFormat, attribute, channel};
 use fechner_perception::tone::{AdaptationState, FittedTone};
 use std::path::Path;
 
@@ -34,13 +34,13 @@ fn write_png(target: &Path, frame: &SceneFrame, fitted: &dyn FittedTone) -> Resu
         }
         None => (frame.shown(fitted), None),
     };
-    let picture = Shown {
+    let picture = DisplayedPicture {
         size: (frame.width as u32, frame.height() as u32),
         rgb_linear_display: &rgb,
         alpha: alpha.as_deref(),
         pixel_aspect_ratio: frame.pixel_aspect_ratio,
     };
-    output::write_shown_png(target, &picture, &frame.viewing.display)?;
+    output::write_png_for(target, &picture, &frame.viewing.display)?;
     Ok(())
 }
 

@@ -32,11 +32,11 @@ pub(super) struct Watch<'a> {
     pub(super) follower: Option<&'a Follower>,
     /// Whether somebody waits for a film with something of every pixel.
     pub(super) is_awaited: bool,
-    pub(super) moving: Mutex<Moving<'a>>,
+    pub(super) inner: Mutex<Inner<'a>>,
 }
 
 /// What changes meanwhile.
-pub(super) struct Moving<'a> {
+pub(super) struct Inner<'a> {
     pub(super) screen: &'a mut Screen,
     /// The glimpse that is shown until the film shows more.
     pub(super) glimpse: &'a mut Option<Glimpse>,
@@ -51,7 +51,7 @@ pub(super) struct Moving<'a> {
     pub(super) told: Instant,
 }
 
-impl Moving<'_> {
+impl Inner<'_> {
     /// A grid coarser than the last glimpse would be a step back.
     fn shows_more_than_glimpsed(&self, state: &RenderState) -> bool {
         let glimpsed = self.glimpse.as_ref().map_or(0, |glimpse| glimpse.film.pixel_count());
@@ -60,56 +60,56 @@ impl Moving<'_> {
 }
 
 impl Watch<'_> {
-    fn tell(&self, moving: &mut Moving<'_>, state: &RenderState) {
-        let total_samples = moving.screen.total_samples + moving.samples_since;
-        count(&mut moving.status, state, total_samples, moving.progress.as_ref());
-        publish(&moving.status, self.shared);
-        moving.told = Instant::now();
+    fn tell(&self, inner: &mut Inner<'_>, state: &RenderState) {
+        let total_samples = inner.screen.total_samples + inner.samples_since;
+        count(&mut inner.status, state, total_samples, inner.progress.as_ref());
+        publish(&inner.status, self.shared);
+        inner.told = Instant::now();
     }
 
-    fn show(&self, moving: &mut Moving<'_>, state: &RenderState) {
+    fn show(&self, inner: &mut Inner<'_>, state: &RenderState) {
         let tone = state.tone.as_ref();
-        *moving.glimpse = None;
+        *inner.glimpse = None;
         let scenery = Scenery { film: &state.film, tone, settings: self.settings, stage: Stage::UnderWay, step: 1 };
-        moving.screen.show(scenery, self.shared);
-        moving.status.note = moving.status.note.take().filter(|_| moving.begun.elapsed() < NOTE_TIME);
-        moving.samples_since = 0;
-        self.tell(moving, state);
+        inner.screen.show(scenery, self.shared);
+        inner.status.note = inner.status.note.take().filter(|_| inner.begun.elapsed() < NOTE_TIME);
+        inner.samples_since = 0;
+        self.tell(inner, state);
     }
 }
 
 impl Monitor for Watch<'_> {
     fn looked(&self, progress: &Progress) {
-        *self.moving.lock().unpoisoned().progress = Some(*progress);
+        *self.inner.lock().unpoisoned().progress = Some(*progress);
     }
 
     fn judged(&self, state: &RenderState, judgement: &Judgement) {
-        let mut moving = self.moving.lock().unpoisoned();
-        moving.screen.looked = Some(Arc::new(Looked::of(judgement)));
-        self.show(&mut moving, state);
-        moving.pace.begin();
+        let mut inner = self.inner.lock().unpoisoned();
+        inner.screen.looked = Some(Arc::new(Looked::of(judgement)));
+        self.show(&mut inner, state);
+        inner.pace.begin();
     }
 
     fn samples_done(&self, samples: u64) {
-        let mut moving = self.moving.lock().unpoisoned();
-        moving.pace.count(samples);
-        moving.samples_since += samples;
+        let mut inner = self.inner.lock().unpoisoned();
+        inner.pace.count(samples);
+        inner.samples_since += samples;
     }
 
     fn most_samples_a_batch(&self) -> u64 {
-        self.moving.lock().unpoisoned().pace.samples()
+        self.inner.lock().unpoisoned().pace.samples()
     }
 
     fn between_batches(&self, state: &RenderState) -> Directive {
-        let mut moving = self.moving.lock().unpoisoned();
-        let between_frames = moving.screen.between_frames(self.shared);
-        moving.pace.counted(between_frames);
-        if moving.shows_more_than_glimpsed(state) && moving.screen.is_due(between_frames) {
-            self.show(&mut moving, state);
-        } else if moving.told.elapsed() >= FIGURES_INTERVAL {
-            self.tell(&mut moving, state);
+        let mut inner = self.inner.lock().unpoisoned();
+        let between_frames = inner.screen.between_frames(self.shared);
+        inner.pace.counted(between_frames);
+        if inner.shows_more_than_glimpsed(state) && inner.screen.is_due(between_frames) {
+            self.show(&mut inner, state);
+        } else if inner.told.elapsed() >= FIGURES_INTERVAL {
+            self.tell(&mut inner, state);
         }
-        moving.pace.begin();
+        inner.pace.begin();
         let is_there = self.is_awaited && is_whole(state);
         if is_there || self.shared.has_news() || self.follower.is_some_and(|follower| follower.is_due(self.shared)) {
             Directive::Leave

@@ -11,9 +11,10 @@
 //! dusk. Near the horizon it depends on turbidity more than real skies do: at 2 the horizon opposite a sun at 10° is
 //! about three times as bright as at 3. Below a sixteenth of a degree of elevation it is that of this elevation.
 
+use super::spectrum::{observer_at, xyz_to_rgb};
 use super::within_rec709;
 use crate::scene::{Environment, Light};
-use glam::{Mat3, Vec3};
+use glam::{DVec3, Vec3};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 use std::ops::RangeInclusive;
 
@@ -167,16 +168,8 @@ fn perez_value([a, b, c, d, e]: &Perez, cos_theta: f32, gamma: f32) -> f32 {
 /// Linear Rec.709 of luminance 1 and this chromaticity; what lies outside the gamut is brought in at that luminance.
 fn rgb_of(x: f32, y: f32) -> Vec3 {
     let y = y.max(1e-3);
-    within_rec709(rgb_of_xyz(Vec3::new(x / y, 1.0, (1.0 - x - y) / y)))
-}
-
-fn rgb_of_xyz(xyz: Vec3) -> Vec3 {
-    // IEC 61966-2-1.
-    Mat3::from_cols(
-        Vec3::new(3.240_97, -0.969_244, 0.055_63),
-        Vec3::new(-1.537_383, 1.875_968, -0.203_977),
-        Vec3::new(-0.498_611, 0.041_555, 1.056_972),
-    ) * xyz
+    let [x, y] = [x, y].map(f64::from);
+    within_rec709(xyz_to_rgb(DVec3::new(x / y, 1.0, (1.0 - x - y) / y)).as_vec3())
 }
 
 /// Irradiance of the sun on a surface that faces it, linear Rec.709 in lx.
@@ -186,38 +179,23 @@ fn solar_irradiance(elevation: f32, turbidity: f32) -> Vec3 {
     let air_mass = 1.0 / (degrees.to_radians().sin() + 0.505_72 * (degrees + 6.079_95).powf(-1.6364));
     // Ångström's turbidity coefficient from the haze, and his exponent of 1.3.
     let beta = 0.046_08 * f64::from(turbidity) - 0.045_86;
-    let (mut outside, mut arriving) = (0.0, glam::DVec3::ZERO);
+    let (mut outside, mut arriving) = (0.0, DVec3::ZERO);
     for step in 0..=80 {
         let nm = 380.0 + 5.0 * f64::from(step);
         let um = nm / 1000.0;
         let transmitted = (-air_mass * (0.008_735 * um.powf(-4.08) + beta * um.powf(-1.3))).exp();
         let emitted = black_body(nm, 5772.0);
-        let response = color_matching(nm);
+        let response = observer_at(nm);
         outside += emitted * response.y;
         arriving += response * (emitted * transmitted);
     }
-    let xyz = (arriving * (SOLAR_ILLUMINANCE_LX / outside)).as_vec3();
-    within_rec709(rgb_of_xyz(xyz))
+    within_rec709(xyz_to_rgb(arriving * (SOLAR_ILLUMINANCE_LX / outside)).as_vec3())
 }
 
 /// Planck's law up to a factor.
 fn black_body(nm: f64, kelvin: f64) -> f64 {
     let um = nm / 1000.0;
     um.powi(-5) / ((14_387.77 / (um * kelvin)).exp() - 1.0)
-}
-
-/// CIE 1931 colour matching functions (fit of Wyman, Sloan and Shirley, "Simple Analytic Approximations to the CIE XYZ
-/// Color Matching Functions", 2013).
-fn color_matching(nm: f64) -> glam::DVec3 {
-    let lobe = |center: f64, below: f64, above: f64| {
-        let t = (nm - center) * if nm < center { below } else { above };
-        (-0.5 * t * t).exp()
-    };
-    glam::DVec3::new(
-        0.362 * lobe(442.0, 0.0624, 0.0374) + 1.056 * lobe(599.8, 0.0264, 0.0323) - 0.065 * lobe(501.1, 0.0490, 0.0382),
-        0.821 * lobe(568.8, 0.0213, 0.0247) + 0.286 * lobe(530.9, 0.0613, 0.0322),
-        1.217 * lobe(437.0, 0.0845, 0.0278) + 0.681 * lobe(459.0, 0.0385, 0.0725),
-    )
 }
 
 #[cfg(test)]

@@ -105,8 +105,7 @@ impl Spectrum {
         for step in 0..=(ROWS - 1) * SUBSTEPS {
             let row = step as f64 / SUBSTEPS as f64;
             let nm = FIRST_NM + row * STEP_NM;
-            let observer =
-                DVec3::from_array([0, 1, 2].map(|channel| between(row, |i| OBSERVER[i][channel]))) * weight(row);
+            let observer = observer(row) * weight(row);
             sum += observer * self.at(nm);
             norm += observer.y;
         }
@@ -134,6 +133,16 @@ impl Spectrum {
 /// Wavelengths of the tables' rows.
 fn rows() -> impl Iterator<Item = f64> {
     (0..ROWS).map(|row| FIRST_NM + row as f64 * STEP_NM)
+}
+
+/// x̄, ȳ, z̄ of the 1931 standard observer at a wavelength of the tables, 360 to 830 nm.
+pub(super) fn observer_at(nm: f64) -> DVec3 {
+    observer((nm - FIRST_NM) / STEP_NM)
+}
+
+/// The same at a row of the tables.
+fn observer(row: f64) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|coordinate| between(row, |i| OBSERVER[i][coordinate])))
 }
 
 fn between(row: f64, value: impl Fn(usize) -> f64) -> f64 {
