@@ -30,8 +30,13 @@ pub fn bytes(path: &Path) -> io::Result<Vec<u8>> {
 /// As [`open`], and where it is no such text.
 pub fn text(path: &Path) -> io::Result<String> {
     let mut text = String::new();
-    open(path)?.read_to_string(&mut text)?;
-    Ok(text)
+    match open(path)?.read_to_string(&mut text) {
+        Ok(_) => Ok(text),
+        Err(error) if error.kind() == io::ErrorKind::InvalidData => {
+            Err(io::Error::new(io::ErrorKind::InvalidData, "is not text in UTF-8"))
+        }
+        Err(error) => Err(error),
+    }
 }
 
 /// What the system knows of a regular file. Asked before it is opened: opening a pipe would wait for a writer for ever.

@@ -116,8 +116,8 @@ pub(super) struct AnimateArguments {
     /// Whose motion the layers of motion tell in mirrors and clear glass. Rough ones always have their surface's.
     #[arg(long, value_enum, default_value = "surface", help_heading = "Picture")]
     velocity_of: VelocityChoice,
-    /// Make a video of the shot when all its frames are there: .y4m, or .mp4 by an installed ffmpeg. It is not HDR:
-    /// an HDR display's white becomes its white.
+    /// Make a video of the shot when all its frames are there: .y4m (BT.709, which programs have to be told), or .mp4
+    /// by an installed ffmpeg. It is not HDR: an HDR display's white becomes its white.
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     video: Option<PathBuf>,
 

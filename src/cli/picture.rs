@@ -26,15 +26,37 @@ pub(super) struct InputPicture {
     made_for: Option<Display>,
     /// How it was shown when it was rendered, where its file says so.
     kept_tone: Option<KeptTone>,
-    /// How much of each pixel it covers, 0 to 1, where an EXR file leaves some of any uncovered. Its values are
-    /// multiplied by it.
-    alpha: Option<Vec<f32>>,
-    /// Whether an EXR file has light and an alpha of 0 all over, as passes have it, which is not looked at.
-    is_pass: bool,
-    /// [`Self::alpha`] of a file of codes, whose light is not multiplied by it.
-    straight_alpha: Option<Vec<f32>>,
+    coverage: Coverage,
     /// Where it lies, if it is a part of a larger picture.
     part_of: Option<PartOf>,
+}
+
+/// How much of each pixel a picture covers.
+enum Coverage {
+    Whole,
+    /// All, of an EXR file that has light and an alpha of 0 all over, as passes have it, which is not looked at.
+    Pass,
+    /// So much of each, 0 to 1, by which an EXR file's values are multiplied.
+    Premultiplied(Vec<f32>),
+    /// So much of each, 0 to 1, by which the light of a file of codes is not multiplied.
+    Straight(Vec<f32>),
+}
+
+impl Coverage {
+    fn alpha(&self) -> Option<&[f32]> {
+        match self {
+            Self::Whole | Self::Pass => None,
+            Self::Premultiplied(alpha) | Self::Straight(alpha) => Some(alpha),
+        }
+    }
+
+    fn premultiplied(&self) -> Option<&[f32]> {
+        self.alpha().filter(|_| matches!(self, Self::Premultiplied(_)))
+    }
+
+    fn straight(&self) -> Option<&[f32]> {
+        self.alpha().filter(|_| matches!(self, Self::Straight(_)))
+    }
 }
 
 /// What lies behind a picture that does not cover all.
@@ -94,9 +116,9 @@ impl InputPicture {
         self.pixel_aspect_ratio
     }
 
-    /// How much of each pixel it covers, 0 to 1; `None` where it covers all of all.
-    pub(super) fn alpha(&self) -> Option<&[f32]> {
-        self.alpha.as_deref()
+    /// How much of each pixel it covers, 0 to 1, by which its values are multiplied; `None` where it covers all of all.
+    pub(super) fn premultiplied_alpha(&self) -> Option<&[f32]> {
+        self.coverage.premultiplied()
     }
 
     /// Where it lies, if it is a part of a larger picture.
@@ -104,8 +126,9 @@ impl InputPicture {
         self.part_of
     }
 
-    fn values(&self) -> Plane {
-        let alpha = |pixel: usize| self.straight_alpha.as_ref().map_or(1.0, |alpha| alpha[pixel]);
+    /// Luminance of the values as they are stored, before black.
+    fn stored_luminance(&self) -> Plane {
+        let alpha = |pixel: usize| self.coverage.straight().map_or(1.0, |alpha| alpha[pixel]);
         let value = |pixel: usize| luminance(self.rgb[pixel]) * alpha(pixel);
         Plane::from_fn(self.width, self.height, |x, y| value(y * self.width + x))
     }
@@ -120,20 +143,16 @@ impl InputPicture {
         Shape { size: self.size(), pixel_aspect_ratio: self.pixel_aspect_ratio }
     }
 
-    /// How much of each pixel it covers, whether or not its values are multiplied by it.
-    fn coverage(&self) -> Option<&[f32]> {
-        self.alpha.as_deref().or(self.straight_alpha.as_deref())
-    }
-
     /// Whether what lies behind it is seen.
     pub(super) fn is_transparent(&self) -> bool {
-        self.coverage().is_some()
+        self.coverage.alpha().is_some()
     }
 
     /// Beside a pass what covers nothing is a pass, too, in which no light is.
     pub(super) fn be_a_pass_beside(&mut self, other: &Self) {
-        if other.is_pass && self.coverage().is_some_and(|coverage| coverage.iter().all(|&covered| covered == 0.0)) {
-            (self.alpha, self.straight_alpha) = (None, None);
+        let covers_nothing = self.coverage.alpha().is_some_and(|alpha| alpha.iter().all(|&covered| covered == 0.0));
+        if matches!(other.coverage, Coverage::Pass) && covers_nothing {
+            self.coverage = Coverage::Pass;
         }
     }
 
@@ -199,7 +218,7 @@ impl InputPicture {
     /// What an operator is fitted to, which is what the picture covers; `None` for one that is ready for the display.
     pub(super) fn scene_light(&self, operator: &dyn ToneOperator) -> Option<SceneLight> {
         let light = SceneLight::of(operator, self.width, &self.scene_rgb_cd_m2()?);
-        Some(match &self.alpha {
+        Some(match self.coverage.premultiplied() {
             Some(alpha) => light.where_covered(alpha),
             None => light,
         })
@@ -219,7 +238,7 @@ impl InputPicture {
     ) -> Vec<[f32; 3]> {
         let mut shown = self.relative_rgb(tone, &viewing.display, map_picture);
         if ground == Ground::White {
-            for (rgb, coverage) in shown.iter_mut().zip(self.coverage().into_iter().flatten()) {
+            for (rgb, coverage) in shown.iter_mut().zip(self.coverage.alpha().into_iter().flatten()) {
                 // Light that alpha does not hold hides what lies behind, as in a PNG.
                 let held = rgb.iter().fold(*coverage, |held, light| held.max(*light)).min(1.0);
                 *rgb = rgb.map(|light| light + (1.0 - held));
@@ -230,7 +249,7 @@ impl InputPicture {
 
     /// Linear display RGB, 0 the display's black and 1 its white; `map` brings a scene there.
     fn relative_rgb(&self, tone: Option<&dyn FittedTone>, display: &Display, map: Mapping) -> Vec<[f32; 3]> {
-        match (self.scene_rgb_cd_m2(), tone, &self.alpha) {
+        match (self.scene_rgb_cd_m2(), tone, self.coverage.premultiplied()) {
             // An operator shows what covers a pixel, as in the PNG of a render: of light times alpha it would make
             // another thing.
             (Some(scene), Some(tone), Some(alpha)) => Covered::of(tone, map, self.width, &scene, alpha).premultiplied(),
@@ -241,7 +260,7 @@ impl InputPicture {
 
     /// Light of codes before the display's black, where they have an alpha.
     fn before_black(&self, mut light: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
-        for (rgb, alpha) in light.iter_mut().zip(self.straight_alpha.iter().flatten()) {
+        for (rgb, alpha) in light.iter_mut().zip(self.coverage.straight().into_iter().flatten()) {
             *rgb = rgb.map(|channel| channel * alpha);
         }
         light
@@ -272,7 +291,7 @@ impl InputPicture {
     fn emitted(&self, nits_per_unit: f64, display: &Display) -> Vec<[f32; 3]> {
         let relative = |(pixel, rgb): (usize, &[f32; 3])| {
             // What lies behind a picture with alpha adds the rest of the display's black.
-            let uncovered = self.alpha.as_ref().map_or(0.0, |alpha| 1.0 - f64::from(alpha[pixel]));
+            let uncovered = self.coverage.premultiplied().map_or(0.0, |alpha| 1.0 - f64::from(alpha[pixel]));
             let behind_cd_m2 = uncovered * display.black_cd_m2;
             rgb.map(|value| display.relative_of_emitted(f64::from(value) * nits_per_unit + behind_cd_m2) as f32)
         };
@@ -292,7 +311,7 @@ impl InputPicture {
     }
 
     /// The values as the file has them; 0 to 1 in a picture that is ready for the display.
-    pub(super) fn codes(&self) -> &[[f32; 3]] {
+    pub(super) fn stored_rgb(&self) -> &[[f32; 3]] {
         &self.rgb
     }
 

@@ -270,7 +270,7 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
     let Some([a_path, b_path]) = arguments.halves.as_deref() else { return Ok(None) };
     let [a, b] = [a_path, b_path].map(|path| InputPicture::read(path, arguments.seeing.nits_per_unit));
     let halves = [a?, b?];
-    if halves[0].codes() == halves[1].codes() {
+    if halves[0].stored_rgb() == halves[1].stored_rgb() {
         bail!(
             "--halves {} {}: equal in every value, which tells nothing of noise: one picture twice, two renders by one seed, or a \
              scene without noise; give two renders by different seeds",

@@ -126,7 +126,7 @@ impl SceneFrame {
         let display = viewing.display.clone();
         let viewing = picture.viewed(viewing).with_context(|| path.display().to_string())?;
         let pixel_aspect_ratio = picture.pixel_aspect_ratio();
-        let (alpha, part_of) = (picture.alpha().map(<[f32]>::to_vec), picture.part_of());
+        let (alpha, part_of) = (picture.premultiplied_alpha().map(<[f32]>::to_vec), picture.part_of());
         let (width, height) = picture.size();
         let Some(rgb_cd_m2) = picture.light_cd_m2() else {
             bail!(is_ready(path));

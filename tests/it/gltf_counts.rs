@@ -253,6 +253,44 @@ fn instances_that_do_not_fit_are_refused() {
     }
 }
 
+/// A scale of 0 takes no light away and moves no camera: a lamp was left out without a word, and a camera as if the file
+/// had none.
+#[test]
+fn flat_nodes_keep_their_lamps_and_cameras() {
+    use fechner::scene::Light;
+    let of_scale = |scale: [f32; 3], kind: &str| {
+        let mut file = File::new();
+        let node = json!({"camera": 0, "translation": [0, 0, 5], "rotation": [0, 1, 0, 0], "scale": scale,
+            "extensions": {"KHR_lights_punctual": {"light": 0}}});
+        file.document["nodes"][1] = node;
+        file.document["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}]);
+        file.document["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+        let light = match kind {
+            "spot" => json!({"type": kind, "intensity": 3, "spot": {}}),
+            _ => json!({"type": kind, "intensity": 3}),
+        };
+        file.document["extensions"] = json!({"KHR_lights_punctual": {"lights": [light]}});
+        file.load().unwrap()
+    };
+    for kind in ["point", "spot", "directional"] {
+        for scale in [[1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]] {
+            let scene = of_scale(scale, kind);
+            assert!(scene.camera.forward.abs_diff_eq(glam::Vec3::Z, 1e-6), "{scale:?}: {}", scene.camera.forward);
+            match (kind, scene.lights.as_slice()) {
+                ("point", [Light::Point { position, .. }]) => assert_eq!(position.z, 5.0),
+                ("spot", [Light::Spot { direction, .. }]) | ("directional", [Light::Directional { direction, .. }]) => {
+                    assert!(direction.abs_diff_eq(glam::Vec3::Z, 1e-6), "{scale:?}: {direction}");
+                }
+                (_, lights) => panic!("{kind}, {scale:?}: {lights:?}"),
+            }
+        }
+    }
+    let told = of_scale([0.0; 3], "spot");
+    for what in ["The light at \"node 1\" is left out", "Camera \"node 1\" is left out"] {
+        assert!(told.notes.iter().any(|note| note.starts_with(what)), "{:?}", told.notes);
+    }
+}
+
 /// Only the first of them was named.
 #[test]
 fn every_hidden_node_is_named_where_nothing_is_left() {

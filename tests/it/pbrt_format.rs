@@ -40,6 +40,17 @@ fn inner_attributes_win_and_wrong_ones_are_refused() {
     assert!(wrong.contains(r#"scene.pbrt:2: Attribute "shapes"; did you mean "shape"?"#), "{wrong}");
 }
 
+/// pbrt looks for objects when it has read everything.
+#[test]
+fn objects_may_be_placed_before_they_are_there() {
+    let object = r#"ObjectBegin "a" Shape "sphere" "float radius" 0.3 ObjectEnd"#;
+    let place = r#"AttributeBegin Translate 1 2 3 ObjectInstance "a" AttributeEnd"#;
+    let placed = |world: &str| scene("", world).instances[0].to_world;
+    assert_eq!(placed(&format!("{place} {object}")), placed(&format!("{object} {place}")));
+    let unknown = try_load(folder().path(), "", &format!("{place} ObjectBegin \"b\" ObjectEnd")).unwrap_err();
+    assert!(unknown.contains(r#"scene.pbrt:2: there is no object "a"; did you mean "b"?"#), "{unknown}");
+}
+
 /// Dropped without a word, the picture was brighter than pbrt's.
 #[test]
 fn a_film_that_limits_samples_is_told() {

@@ -52,6 +52,11 @@ pub(super) fn write(
     match format {
         VideoFormat::Y4m => {
             write_beside(path, |file| stream(BufWriter::new(file), files, fitted, shot).map_err(failed))?;
+            say!(
+                "note: {}: its colours are those of ITU-R BT.709, which .y4m has no word for: ffmpeg has to be told by \
+                 -vf scale=in_color_matrix=bt709",
+                path.display()
+            );
         }
         // Under a name of this process's own: several that complete one shot would write into each other's file.
         VideoFormat::Mp4 => {
@@ -71,7 +76,7 @@ fn encode(
     let mut ffmpeg = Command::new("ffmpeg")
         .args(["-y", "-loglevel", "error", "-f", "yuv4mpegpipe", "-i", "-", "-c:v", "libx264", "-crf", "14"])
         .args(["-pix_fmt", "yuv420p", "-color_primaries", "bt709", "-color_trc", "bt709", "-colorspace", "bt709"])
-        .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-f", "mp4"])
+        .args(["-vf", &even_sides(shot.trace.width, shot.trace.height), "-f", "mp4"])
         // It takes what begins with a dash or with letters and a colon for something else than a file, unless its
         // folder is named.
         .arg(std::path::absolute(file)?)
@@ -87,6 +92,13 @@ fn encode(
         _ if !ended.success() => bail!("ffmpeg failed with {ended}"),
         sent => sent,
     }
+}
+
+/// A filter that gives a picture even sides, as half as many colours to a side want them: an odd one's last column or
+/// row comes twice.
+fn even_sides(width: u32, height: u32) -> String {
+    let (right, bottom) = (width % 2, height % 2);
+    format!("pad=iw+{right}:ih+{bottom},fillborders=right={right}:bottom={bottom}:mode=smear")
 }
 
 /// Whether writing failed since nobody reads any more.
@@ -125,7 +137,7 @@ pub(super) fn shown_rgb8(
     Ok(match picture.scene_rgb_cd_m2() {
         Some(scene) => encode_srgb8(width, &map_picture(fitted().as_ref(), width as usize, &scene)),
         None if shot.viewing.display.eotf == Eotf::Pq => {
-            encode_srgb8(width, &decode_pq(picture.codes(), &Primaries::REC2020, &shot.viewing.display))
+            encode_srgb8(width, &decode_pq(picture.stored_rgb(), &Primaries::REC2020, &shot.viewing.display))
         }
         None => picture.codes8(),
     })
@@ -175,6 +187,21 @@ mod tests {
     }
 
     /// A frame that cannot be read leaves the video that was there, and nothing beside it.
+    /// Of an empty stream ffmpeg says that it is empty: why it is says the frame.
+    #[test]
+    fn a_frame_that_cannot_be_read_is_named() {
+        if VideoFormat::of(Path::new("a.mp4")).is_err() {
+            eprintln!("no ffmpeg: not tested");
+            return;
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let fitted = |_: usize| -> Box<dyn FittedTone> { panic!("there is no frame") };
+        let missing = folder.path().join("a.0.exr");
+        let error = write(&folder.path().join("a.mp4"), VideoFormat::Mp4, [missing].into_iter(), &fitted, &shot())
+            .expect_err("there is no such frame");
+        assert!(format!("{error:#}").contains("a.0.exr"), "{error:#}");
+    }
+
     #[test]
     fn a_video_that_fails_replaces_none() {
         let folder = tempfile::tempdir().expect("a folder");

@@ -1,7 +1,7 @@
 //! Reads pictures for the commands: what a file's bytes, channels and header say of its values. How they are
 //! shown is left to [`super`].
 
-use super::{Codes, Content, InputPicture};
+use super::{Codes, Content, Coverage, InputPicture};
 use crate::cli::channels::{self, Colour};
 use crate::cli::importance;
 use crate::cli::kept_tone::{self, KeptTone};
@@ -65,7 +65,7 @@ impl InputPicture {
         let source = Source::single(path);
         let picture = Self::read_in(source, Unit::Meaningless)?;
         picture.note_if_transparent(source, BEFORE_BLACK);
-        Ok(picture.values())
+        Ok(picture.stored_luminance())
     }
 
     fn read_in(source: Source<'_>, unit: Unit) -> Result<Self> {
@@ -110,9 +110,14 @@ impl InputPicture {
         let (width, height) = (picture.width as usize, picture.height as usize);
         let alpha = alpha(exr);
         let is_pass = has_uncovered_light(&picture.rgb, alpha.as_deref());
-        if is_pass {
-            source.note("its alpha is 0 all over, and is not looked at");
-        }
+        let coverage = match alpha {
+            Some(_) if is_pass => {
+                source.note("its alpha is 0 all over, and is not looked at");
+                Coverage::Pass
+            }
+            Some(alpha) => Coverage::Premultiplied(alpha),
+            None => Coverage::Whole,
+        };
         Ok(Self {
             width,
             height,
@@ -121,9 +126,7 @@ impl InputPicture {
             pixel_aspect_ratio: exr.pixel_aspect_ratio,
             made_for: kept_tone::display_in(exr),
             kept_tone,
-            alpha: alpha.filter(|_| !is_pass),
-            is_pass,
-            straight_alpha: None,
+            coverage,
             part_of: exr.part_of,
         })
     }
@@ -163,9 +166,9 @@ impl InputPicture {
             }
             PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb(of(Primaries::REC709)),
         };
-        let straight_alpha = straight_alpha(&image);
+        let coverage = straight_alpha(&image).map_or(Coverage::Whole, Coverage::Straight);
         let pixel_aspect_ratio = output::png_pixel_aspect_ratio(&bytes);
-        Ok(Self { straight_alpha, pixel_aspect_ratio, ..Self::from_image(image, Content::Display(codes)) })
+        Ok(Self { coverage, pixel_aspect_ratio, ..Self::from_image(image, Content::Display(codes)) })
     }
 
     fn from_image(image: DynamicImage, content: Content) -> Self {
@@ -180,9 +183,7 @@ impl InputPicture {
             pixel_aspect_ratio: 1.0,
             made_for: None,
             kept_tone: None,
-            alpha: None,
-            is_pass: false,
-            straight_alpha: None,
+            coverage: Coverage::Whole,
             part_of: None,
         }
     }

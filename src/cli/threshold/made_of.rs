@@ -27,7 +27,7 @@ impl MadeOf {
         // What files hold between black and white has 8 bits, perhaps.
         let step = if guide.holds_codes() { 2.0 / 255.0 } else { SMALLEST_HALF * guide.light_of_one_cd_m2() };
         let [guide, a, b] =
-            [guide, a, b].map(|picture| picture.light_cd_m2().unwrap_or_else(|| picture.codes().to_vec()));
+            [guide, a, b].map(|picture| picture.light_cd_m2().unwrap_or_else(|| picture.stored_rgb().to_vec()));
         let values = [&guide, &a, &b].map(|picture| picture.as_flattened().iter().map(|&value| f64::from(value)));
         let [guide, a, b] = values;
         let shares = Shares::of(guide.zip(a.zip(b)), step);

@@ -49,13 +49,17 @@ pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<:
             format_args!("needs the extension {refused}, which is not read{advice}"),
         ));
     }
-    // Those of materials are named whether the file declares them or not.
+    // Those of materials and nodes are named whether the file declares them or not.
     let of_materials = root.materials.iter().filter_map(|material| material.extensions.as_ref());
     let of_materials = of_materials.flat_map(|extensions| extensions.others.keys());
-    let used: BTreeSet<&str> = root.extensions_used.iter().chain(of_materials).map(String::as_str).collect();
+    let of_nodes = root.nodes.iter().filter_map(|node| node.extensions.as_ref());
+    let of_nodes = of_nodes.flat_map(|extensions| extensions.others.keys());
+    let declared = root.extensions_used.iter();
+    let used: BTreeSet<&str> = declared.chain(of_materials).chain(of_nodes).map(String::as_str).collect();
     for name in used.into_iter().filter(|name| !KNOWN.contains(name)) {
         let instead = match name {
             "KHR_materials_variants" => "the default variant is rendered",
+            "KHR_node_visibility" => "what it hides is rendered",
             _ => "it is left out",
         };
         builder.note(format!("{name} is not supported: {instead}."));
@@ -70,6 +74,7 @@ pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<:
     check_animations(path, &root)?;
     check_by_crate(path, &root)?;
     note_morphed_attributes(json, &root, builder);
+    note_projections(&root, builder);
     Ok(::gltf::Document::from_json_without_validation(root))
 }
 
@@ -106,8 +111,22 @@ fn check_by_crate(path: &Path, root: &Root) -> Result<(), LoadError> {
     if errors.is_empty() {
         return Ok(());
     }
-    let error = ::gltf::Error::Validation(errors);
-    Err(LoadError::invalid(path, format_args!("not valid glTF: {error}")))
+    /// What is named of many slips.
+    const MOST: usize = 3;
+    let named: Vec<String> = errors.iter().take(MOST).map(|(place, error)| format!("{place}: {error}")).collect();
+    let more = errors.len().saturating_sub(MOST);
+    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+    Err(LoadError::invalid(path, format_args!("not valid glTF: {}{more}", named.join("; "))))
+}
+
+/// Names nodes whose matrix is no affine one, as the format wants them to be.
+fn note_projections(root: &Root, builder: &mut Builder) {
+    for (number, node) in root.nodes.iter().enumerate() {
+        let last_row = node.matrix.map(|matrix| [matrix[3], matrix[7], matrix[11], matrix[15]]);
+        if last_row.is_some_and(|row| row != [0.0, 0.0, 0.0, 1.0]) {
+            builder.note(format!("The matrix of node {number} is taken as if its last row were 0, 0, 0, 1."));
+        }
+    }
 }
 
 /// Names what morph targets change besides positions, normals and tangents, which the crate does not hand on.

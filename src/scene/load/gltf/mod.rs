@@ -147,7 +147,7 @@ impl<'a> Reader<'a> {
             self.camera(&camera, &name, &to_world, motion::of_camera(&self.moments, matrices));
         }
         if let Some(light) = node.light() {
-            self.light(&light, &to_world);
+            self.light(&light, &name, &to_world);
         }
         Ok(())
     }
@@ -327,8 +327,6 @@ impl<'a> Reader<'a> {
             None => (node.to_owned(), None),
         };
         let position = Vec3::from(to_world.translation);
-        let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
-        let up = to_world.transform_vector3(Vec3::Y).try_normalize();
         let (projection, aspect, usable) = match camera.projection() {
             ::gltf::camera::Projection::Perspective(perspective) => {
                 let vertical_fov_deg = perspective.yfov().to_degrees();
@@ -342,29 +340,30 @@ impl<'a> Reader<'a> {
             }
         };
         let aspect = aspect.filter(|aspect| (MAX_OBLONG.recip()..=MAX_OBLONG).contains(aspect));
-        let (Some(forward), Some(up)) = (forward, up) else {
-            return;
-        };
-        if !position.is_finite() || !usable || !Camera::axes_span(forward, up) {
+        let axes =
+            axes(to_world).filter(|axes| usable && position.is_finite() && Camera::axes_span(axes.forward, axes.up));
+        let Some(Axes { forward, up }) = axes else {
             self.builder.note(format!("Camera \"{name}\" is left out: its transform, angle or height is not usable."));
             return;
-        }
+        };
         let framing = aspect.map_or(Framing::Fixed, Framing::Stated);
         let camera = Camera { motion, ..Camera::placed(position, forward, up, projection) };
         self.builder.cameras.push(NamedCamera { name, holder, camera, framing });
     }
 
-    fn light(&mut self, light: &::gltf::khr_lights_punctual::Light, to_world: &Affine3A) {
+    fn light(&mut self, light: &::gltf::khr_lights_punctual::Light, node: &str, to_world: &Affine3A) {
         use ::gltf::khr_lights_punctual::Kind;
         let strength = Vec3::from_array(light.color()) * light.intensity() / self.builder.nits_per_unit as f32;
         let position = Vec3::from(to_world.translation);
-        let Some(direction) = to_world.transform_vector3(Vec3::NEG_Z).try_normalize() else {
+        let direction = match (light.kind(), axes(to_world)) {
+            (Kind::Point, None) => Some(Vec3::NEG_Z),
+            (_, axes) => axes.map(|axes| axes.forward),
+        };
+        let Some(direction) = direction.filter(|_| strength.is_finite() && position.is_finite()) else {
+            self.builder
+                .note(format!("The light at \"{node}\" is left out: its place, direction or strength is not usable."));
             return;
         };
-        if !strength.is_finite() || !position.is_finite() {
-            self.builder.note("A light that is not finite is left out.");
-            return;
-        }
         if strength.min_element() < 0.0 {
             self.builder.note("Light below 0 is taken as 0: a light has a negative intensity or colour.");
         }
@@ -392,6 +391,21 @@ impl<'a> Reader<'a> {
             }
         });
     }
+}
+
+/// Where a node looks, and what is above it: along its own −z and y.
+struct Axes {
+    forward: Vec3,
+    up: Vec3,
+}
+
+/// A node's axes, of length 1. Scale means nothing to cameras and lights: an axis that it takes away is perpendicular to
+/// both others.
+fn axes(to_world: &Affine3A) -> Option<Axes> {
+    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis).try_normalize());
+    let z = z.or_else(|| x?.cross(y?).try_normalize())?;
+    let up = y.or_else(|| z.cross(x?).try_normalize())?;
+    Some(Axes { forward: -z, up })
 }
 
 /// The triangles of lists, strips and fans; an incomplete last one is dropped.

@@ -43,6 +43,7 @@ impl Reader {
     }
 
     fn point(&mut self, emitter: &Element, to_world: &Affine3A) -> Result<(), LoadError> {
+        check_placed_once(emitter, "position")?;
         let position = emitter.vector("position")?.unwrap_or(to_world.translation.into());
         let intensity = self.light_color(emitter, "intensity")?;
         self.builder.lights.push(Light::Point { position, intensity });
@@ -68,6 +69,7 @@ impl Reader {
     }
 
     fn directional(&mut self, emitter: &Element, to_world: &Affine3A) -> Result<(), LoadError> {
+        check_placed_once(emitter, "direction")?;
         let direction = match emitter.vector("direction")? {
             Some(direction) => direction.try_normalize().ok_or_else(|| emitter.error("a direction of no length"))?,
             None => ahead(emitter, to_world)?,
@@ -191,6 +193,14 @@ impl Reader {
 fn ahead(emitter: &Element, to_world: &Affine3A) -> Result<Vec3, LoadError> {
     let axis = to_world.transform_vector3(Vec3::Z).try_normalize();
     axis.ok_or_else(|| emitter.error("its transform has no direction"))
+}
+
+/// Refuses `to_world` beside a parameter that says the same, as Mitsuba 3 does.
+fn check_placed_once(emitter: &Element, parameter: &str) -> Result<(), LoadError> {
+    match (emitter.child(parameter), emitter.child("toworld")) {
+        (Some(parameter), Some(_)) => Err(parameter.error("this and to_world exclude each other")),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

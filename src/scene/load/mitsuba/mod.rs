@@ -66,7 +66,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     };
     reader.builder.bitangent_ignores_v = true;
     reader.builder.set_nits_per_unit(ASSUMED_NITS_PER_UNIT);
-    reader.name_all(&root);
+    reader.name_all(&root)?;
     for child in &root.children {
         reader.element(child)?;
     }
@@ -135,13 +135,14 @@ impl Reader {
         Ok(())
     }
 
-    /// Finds everything that has an id, wherever it stands.
-    fn name_all(&mut self, element: &Rc<Element>) {
+    /// Finds everything that has an id, wherever it stands; two of one are refused, as by Mitsuba 3.
+    fn name_all(&mut self, element: &Rc<Element>) -> Result<(), LoadError> {
         for child in &element.children {
-            if child.tag != "ref"
+            if !["ref", "alias"].contains(&child.tag.as_str())
                 && let Some(id) = child.attribute("id")
+                && let Some(other) = self.named.insert(id.to_owned(), Rc::clone(child))
             {
-                self.named.entry(id.to_owned()).or_insert_with(|| Rc::clone(child));
+                return Err(child.error(format_args!("the id \"{id}\" is that of another at {}", other.place())));
             }
             if child.tag == "alias"
                 && let (Some(id), Some(target)) = (child.attribute("as"), child.attribute("id"))
@@ -149,8 +150,9 @@ impl Reader {
             {
                 self.named.insert(id.to_owned(), target);
             }
-            self.name_all(child);
+            self.name_all(child)?;
         }
+        Ok(())
     }
 
     /// What a `<ref>` means.

@@ -6,7 +6,7 @@ use super::lexer::{Lexer, Token};
 use super::parameters::{self, Parameters};
 use super::state::{DEEPEST_STACK, Opening, Transforms};
 use super::transforms::TransformDirective;
-use super::{Reader, Scope, materials, shapes, textures};
+use super::{Reader, Saved, Scope, UseOfObject, materials, shapes, textures};
 use std::path::Path;
 use std::rc::Rc;
 
@@ -112,9 +112,33 @@ const DIRECTIVES: [(&str, Directive); 41] = [
     ("Accelerator", Directive::Method(Method::Accelerator)),
 ];
 
+/// Which part of a file a statement belongs to, as pbrt-v4 checks it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    /// What stands before `WorldBegin`: camera and film.
+    Options,
+    /// What stands behind it: the scene.
+    World,
+    Any,
+}
+
 impl Directive {
     fn named(word: &str) -> Option<Self> {
         DIRECTIVES.iter().find(|(name, _)| *name == word).map(|&(_, directive)| directive)
+    }
+
+    /// Where it has to stand. Of what is not rendered as the file says it does not matter.
+    fn part(self) -> Part {
+        match self {
+            Self::WorldBegin | Self::Entity(Entity::Camera | Entity::Film) => Part::Options,
+            Self::Transform(TransformDirective::Times) => Part::Options,
+            Self::Open(_) | Self::Close(_) | Self::ObjectInstance | Self::Texture => Part::World,
+            Self::State(StateDirective::ReverseOrientation | StateDirective::NamedMaterial) => Part::World,
+            Self::Entity(Entity::MakeNamedMedium) => Part::Any,
+            Self::Entity(_) => Part::World,
+            Self::Transform(_) | Self::State(_) | Self::WorldEnd | Self::Include | Self::Import => Part::Any,
+            Self::Option | Self::Method(_) => Part::Any,
+        }
     }
 }
 
@@ -157,6 +181,7 @@ impl Reader<'_> {
             let problem = format!("unknown directive {word}{}", suggestion(word, known));
             return Err(LoadError::invalid_at(lexer.place(line), problem));
         };
+        self.check_part(word, directive, lexer.place(line))?;
         match directive {
             Directive::Transform(directive) => self.transform(directive, lexer, line)?,
             Directive::State(directive) => self.change_state(directive, lexer, line)?,
@@ -166,7 +191,7 @@ impl Reader<'_> {
             Directive::ObjectInstance => {
                 let name = string(lexer, line)?;
                 if self.scope != Scope::Definitions {
-                    self.place_object(&name, lexer.place(line))?;
+                    self.place_object(name, lexer.place(line))?;
                 }
             }
             Directive::WorldBegin => self.begin_world()?,
@@ -183,6 +208,28 @@ impl Reader<'_> {
             Directive::Method(method) => self.method(method, lexer, line)?,
         }
         Ok(())
+    }
+
+    /// Refuses what stands on the wrong side of `WorldBegin`: it would be lost, or seen in the camera's transform.
+    fn check_part(&self, word: &str, directive: Directive, place: Place) -> Result<(), LoadError> {
+        let problem = match (directive.part(), self.in_world) {
+            (Part::Options, true) if directive == Directive::WorldBegin => "there is a second WorldBegin".to_owned(),
+            (Part::Options, true) => format!("{word} has to stand before WorldBegin"),
+            (Part::World, false) => format!("{word} has to stand behind WorldBegin"),
+            _ => return Ok(()),
+        };
+        Err(LoadError::invalid_at(place, problem))
+    }
+
+    /// Refuses a second thing of a kind and name, as pbrt-v4 does: the first would be lost.
+    fn define(&mut self, kind: &'static str, name: &str, place: Place) -> Result<(), LoadError> {
+        if self.defined.insert((kind, name.to_owned())) {
+            return Ok(());
+        }
+        Err(LoadError::invalid_at(
+            place,
+            format_args!("there are two {kind}s of the name \"{name}\"; give each its own"),
+        ))
     }
 
     fn change_state(&mut self, directive: StateDirective, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
@@ -237,6 +284,7 @@ impl Reader<'_> {
         if self.current_object.is_some() {
             return Err(LoadError::invalid_at(lexer.place(line), "ObjectBegin inside an object"));
         }
+        self.define("object", &name, lexer.place(line))?;
         self.push(Opening::Object, lexer.place(line))?;
         self.objects.insert(name.clone(), Vec::new());
         self.current_object = Some(name);
@@ -263,6 +311,7 @@ impl Reader<'_> {
                 return Err(LoadError::invalid_at(lexer.place(line), problem));
             }
         };
+        self.define(if class == "float" { "float texture" } else { "spectrum texture" }, &name, lexer.place(line))?;
         let parameters = self.parameters(lexer, line, Some("texture"))?;
         self.textures.insert((class, name), Rc::new(textures::Definition::new(&kind, parameters)));
         Ok(())
@@ -308,10 +357,14 @@ impl Reader<'_> {
             Entity::MakeNamedMaterial => {
                 let kind = parameters.string("type")?.map(str::to_owned);
                 let kind = kind.ok_or_else(|| parameters.error("a named material needs a \"string type\""))?;
+                self.define("material", &name, parameters.place())?;
                 let definition = materials::Definition { name: name.clone(), kind, parameters };
                 self.named_materials.insert(name, Rc::new(definition));
             }
-            Entity::MakeNamedMedium => self.medium(&name, &parameters)?,
+            Entity::MakeNamedMedium => {
+                self.define("medium", &name, parameters.place())?;
+                self.medium(&name, &parameters)?;
+            }
             Entity::LightSource => {
                 super::super::check_placed(&self.main, self.builder.placed() + 1)?;
                 self.light(&name, &parameters)?;
@@ -355,12 +408,12 @@ impl Reader<'_> {
         if self.stack.len() >= DEEPEST_STACK {
             return Err(LoadError::invalid_at(place, format_args!("attributes nested deeper than {DEEPEST_STACK}")));
         }
-        self.stack.push((self.state.clone(), opening));
+        self.stack.push(Saved { state: self.state.clone(), opening, place });
         Ok(())
     }
 
     fn pop(&mut self, opening: Opening, word: &str, place: Place) -> Result<(), LoadError> {
-        let Some((state, opened)) = self.stack.pop() else {
+        let Some(Saved { state, opening: opened, .. }) = self.stack.pop() else {
             return Err(LoadError::invalid_at(place, format_args!("{word} without {}", opening.begin())));
         };
         if opened != opening {
@@ -385,16 +438,32 @@ impl Reader<'_> {
         read.map_err(|error| if self.includes == 0 { error.referenced_from(place) } else { error })
     }
 
-    fn place_object(&mut self, name: &str, place: Place) -> Result<(), LoadError> {
-        let Some(parts) = self.objects.get(name) else {
-            return Err(LoadError::invalid_at(place, no_such("object", name, self.objects.keys())));
-        };
+    /// Places an object here, or at the file's end where it is not there yet: pbrt looks for it then.
+    fn place_object(&mut self, name: String, place: Place) -> Result<(), LoadError> {
         if self.current_object.is_some() {
             return Err(LoadError::invalid_at(place, "an object cannot hold an instance of another"));
         }
+        let use_of_object = UseOfObject { name, transforms: self.state.transforms, place };
+        if self.objects.contains_key(&use_of_object.name) {
+            return self.place_parts(&use_of_object);
+        }
+        super::super::check_placed(&self.main, self.builder.placed() + self.uses_ahead.len() + 1)?;
+        self.uses_ahead.push(use_of_object);
+        Ok(())
+    }
+
+    /// Places what was used before it was there.
+    pub(super) fn place_objects_ahead(&mut self) -> Result<(), LoadError> {
+        std::mem::take(&mut self.uses_ahead).iter().try_for_each(|use_of_object| self.place_parts(use_of_object))
+    }
+
+    fn place_parts(&mut self, use_of_object: &UseOfObject) -> Result<(), LoadError> {
+        let UseOfObject { name, transforms, place } = use_of_object;
+        let Some(parts) = self.objects.get(name) else {
+            return Err(LoadError::invalid_at(place.clone(), no_such("object", name, self.objects.keys())));
+        };
         super::super::check_placed(&self.main, self.builder.placed() + parts.len())?;
-        let transforms = self.state.transforms;
-        let placed: Vec<_> = parts.iter().map(|part| shapes::place_part(self, part, &transforms)).collect();
+        let placed: Vec<_> = parts.iter().map(|part| shapes::place_part(self, part, transforms)).collect();
         self.builder.instances.extend(placed);
         Ok(())
     }

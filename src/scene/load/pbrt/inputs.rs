@@ -47,7 +47,11 @@ impl Reader<'_> {
                 if meaning != Meaning::Light {
                     return Err(wrong("a blackbody is light, not a surface"));
                 }
-                let kelvin = numbers.first().copied().unwrap_or(0.0);
+                let [kelvin] = numbers[..] else {
+                    return Err(wrong(
+                        "expected one temperature in kelvin (a scale, as of version 3, goes into \"scale\")",
+                    ));
+                };
                 Spectrum::blackbody(kelvin).ok_or_else(|| wrong("expected a temperature in kelvin above 0"))?
             }
             (Values::Numbers(numbers), _) => {

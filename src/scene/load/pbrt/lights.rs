@@ -3,7 +3,7 @@
 //! A light's RGB is radiance as it stands, any other spectrum gives luminance 1 (see [`super::inputs`]); `power` is
 //! lumen and `illuminance` lux, spread as pbrt-v4 does (its `lights.cpp`).
 
-use super::super::error::LoadError;
+use super::super::error::{LoadError, unknown};
 use super::super::{environment, luminance};
 use super::Reader;
 use super::inputs::Meaning;
@@ -64,7 +64,10 @@ impl Reader<'_> {
                 self.builder.lights.push(Light::Point { position, intensity });
             }
             "projection" => return Err(parameters.unsupported("lights of type \"projection\" are not rendered")),
-            other => return Err(parameters.error(format_args!("unknown light \"{other}\""))),
+            other => {
+                let known = ["point", "spot", "distant", "infinite", "goniometric"];
+                return Err(parameters.error(unknown("light", other, known)));
+            }
         }
         self.note_unread(&format!("light \"{kind}\""), parameters);
         Ok(())

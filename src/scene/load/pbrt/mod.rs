@@ -19,11 +19,11 @@ mod transforms;
 
 use super::LoadOptions;
 use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
-use super::error::{LoadError, no_such};
+use super::error::{LoadError, Place, no_such};
 use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
 use parameters::Parameters;
 use state::{Opening, State, Transforms};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -55,6 +55,20 @@ struct Part {
     mesh: MeshId,
     material: MaterialId,
     transforms: Transforms,
+}
+
+/// A state that comes back when what opened it is closed.
+struct Saved {
+    state: State,
+    opening: Opening,
+    place: Place,
+}
+
+/// An object where it is placed.
+struct UseOfObject {
+    name: String,
+    transforms: Transforms,
+    place: Place,
 }
 
 /// A statement of the file: two that say the same are two.
@@ -112,14 +126,17 @@ struct Reader<'a> {
     scope: Scope,
     builder: Builder,
     state: State,
-    /// Saved states, and what opened them.
-    stack: Vec<(State, Opening)>,
+    stack: Vec<Saved>,
     coordinate_systems: HashMap<String, Transforms>,
     textures: HashMap<(&'static str, String), Rc<textures::Definition>>,
     named_materials: HashMap<String, Rc<materials::Definition>>,
     media: HashMap<String, materials::Medium>,
     objects: HashMap<String, Vec<Part>>,
+    /// Objects that were placed before they were there.
+    uses_ahead: Vec<UseOfObject>,
     current_object: Option<String>,
+    /// Kind and name of what the file has defined so far.
+    defined: HashSet<(&'static str, String)>,
     converted: HashMap<MaterialKey, Option<MaterialId>>,
     ply_files: HashMap<(PathBuf, bool), MeshId>,
     camera: Option<(String, Parameters, Transforms)>,
@@ -152,7 +169,9 @@ impl<'a> Reader<'a> {
             named_materials: HashMap::new(),
             media: HashMap::new(),
             objects: HashMap::new(),
+            uses_ahead: Vec::new(),
             current_object: None,
+            defined: HashSet::new(),
             converted: HashMap::new(),
             ply_files: HashMap::new(),
             camera: None,
@@ -316,12 +335,13 @@ impl Reader<'_> {
     }
 
     fn into_builder(mut self, path: &Path) -> Result<Builder, LoadError> {
-        if let Some((_, opened)) = self.stack.last() {
-            return Err(LoadError::invalid(path, format_args!("{} is never closed", opened.begin())));
+        if let Some(Saved { opening, place, .. }) = self.stack.pop() {
+            return Err(LoadError::invalid_at(place, format_args!("{} is never closed", opening.begin())));
         }
         if !self.in_world {
             return Err(LoadError::invalid(path, "the file has no WorldBegin"));
         }
+        self.place_objects_ahead()?;
         let nits = if self.is_photometric {
             1.0
         } else {

@@ -120,14 +120,19 @@ fn snapshot(value: &Value, owner: Owner, seconds: f64) -> Result<Option<Snapshot
     let keyframes = Keyframes::read(&list, &known, |fields| {
         keys.iter().map(|key| numbers(&fields.require(key)?)).collect::<Result<Vec<_>, _>>()
     })?;
+    for (place, key) in keys.iter().enumerate() {
+        // All of them, whatever time is asked for.
+        let mut counts = keyframes.values().map(|values: &Vec<Vec<f64>>| values[place].len());
+        let first = counts.next();
+        if counts.any(|count| Some(count) != first) {
+            return Err(list.error(format_args!("\"{key}\" must have as many values in each keyframe")));
+        }
+    }
     let Between { before, after, share } = keyframes.around(seconds);
     let mut entries = Vec::new();
     for (key, (before, after)) in keys.iter().zip(before.iter().zip(after)) {
         if let Some(fixed) = table.get(key) {
             return Err(fixed.error("is given by keyframes as well"));
-        }
-        if before.len() != after.len() {
-            return Err(list.error(format_args!("\"{key}\" must have as many values in each keyframe")));
         }
         let share = f64::from(share);
         let values: Vec<String> = before

@@ -3,7 +3,7 @@
 //! Serde's derive would say "data did not match any variant" for a colour that is neither number, list nor table, and
 //! loses the line inside tagged tables; this reader keeps both for a few lines a field.
 
-use super::super::error::{LoadError, Place, one_line, suggestion, unknown};
+use super::super::error::{LoadError, Place, nearest, one_line, suggestion, unknown};
 use super::super::lines::LineStarts;
 use glam::{Vec2, Vec3};
 use std::path::Path;
@@ -169,7 +169,10 @@ impl<'a> Value<'a> {
 
     /// The elements of a list.
     pub(super) fn array(&self) -> Result<Vec<Value<'a>>, LoadError> {
-        let array = self.value.as_array().ok_or_else(|| self.wrong_type("a list"))?;
+        let array = self.value.as_array().ok_or_else(|| match self.is_table() {
+            true => self.wrong_type(&format!("a list, each of whose entries begins with [[{}]]", self.path)),
+            false => self.wrong_type("a list"),
+        })?;
         let element = |(index, value): (usize, &'a Spanned<DeValue<'a>>)| Value {
             source: self.source,
             path: format!("{}[{index}]", self.path),
@@ -261,9 +264,10 @@ impl<'a> Fields<'a> {
         };
         let written = key.get_ref().as_ref();
         let within = if self.path.is_empty() { String::new() } else { format!(" in {}", self.path) };
+        let absent = known.iter().copied().filter(|&key| !self.table.contains_key(key));
         Err(LoadError::invalid_at(
             Place::line(self.source.file, self.source.line_of(key.span().start)),
-            format_args!("unknown key \"{written}\"{within}{}", suggestion(written, known.iter().copied())),
+            format_args!("unknown key \"{written}\"{within}{}", suggestion(written, absent)),
         ))
     }
 
@@ -288,7 +292,11 @@ impl<'a> Fields<'a> {
     }
 
     pub(super) fn require(&self, key: &str) -> Result<Value<'a>, LoadError> {
-        self.get(key).ok_or_else(|| self.error(format_args!("\"{key}\" is missing")))
+        self.get(key).ok_or_else(|| {
+            let written = nearest(key, self.table.keys().map(|key| key.get_ref().as_ref()));
+            let slip = written.map_or_else(String::new, |written| format!("; is \"{written}\" meant for it?"));
+            self.error(format_args!("\"{key}\" is missing{slip}"))
+        })
     }
 
     /// The value, read by `read`, or the default when it is not there.

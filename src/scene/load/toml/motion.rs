@@ -59,6 +59,11 @@ impl<T> Keyframes<T> {
         times
     }
 
+    /// What the keyframes say, in their order.
+    pub(super) fn values(&self) -> impl Iterator<Item = &T> {
+        self.frames.iter().map(|(_, value)| value)
+    }
+
     pub(super) fn around(&self, time: f64) -> Between<'_, T> {
         let after = self.frames.partition_point(|(seconds, _)| *seconds <= time);
         let clamp = |index: usize| &self.frames[index.min(self.frames.len() - 1)];
