@@ -169,12 +169,14 @@ fn find_display(name: &str) -> Result<Display> {
     }
     let text = read_file::text(Path::new(name)).with_context(|| format!("display file {name}"))?;
     count_as_read(Path::new(name));
-    Display::from_toml(&text).map_err(|error| in_display_file(name, error))
+    Display::from_toml(&text).map_err(|error| in_display_file(name, &text, error))
 }
 
 /// What is wrong with a display's file, said as of a scene's: "my.toml:2: …".
-fn in_display_file(name: &str, error: Error) -> anyhow::Error {
+fn in_display_file(name: &str, text: &str, error: Error) -> anyhow::Error {
+    let line_of = |key: &str| text.lines().position(|line| line.trim_start().starts_with(key)).map(|line| line + 1);
     match error {
+        Error::OutOfRange { what, .. } if let Some(line) = line_of(what) => anyhow!("{name}:{line}: {error}"),
         Error::Parse { line: Some(line), reason, .. } => anyhow!("{name}:{line}: {reason}"),
         Error::Parse { reason, .. } => anyhow!("{name}: {reason}"),
         other => anyhow!("{name}: {other}"),

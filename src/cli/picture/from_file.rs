@@ -6,6 +6,7 @@ use crate::cli::channels::{self, Colour};
 use crate::cli::importance;
 use crate::cli::kept_tone::{self, KeptTone};
 use anyhow::{Context, Result, bail};
+use fechner::digits::significant;
 use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, negative_light};
 use fechner::hdr_read::{self, HdrHeader, with_known_header};
 use fechner::jpeg_read;
@@ -215,6 +216,9 @@ fn straight_alpha(image: &DynamicImage) -> Option<Vec<f32>> {
 
 /// A picture of a limited size. What its values mean goes by its name, so that its bytes must be what that says.
 fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
+    if bytes.is_empty() {
+        bail!("{}: it is empty", path.display());
+    }
     let bytes = &*with_known_header(bytes);
     let named = ImageFormat::from_path(path).with_context(|| format!("{}", path.display()))?;
     let found = image::guess_format(bytes).with_context(|| format!("{}: not a readable picture", path.display()))?;
@@ -289,7 +293,8 @@ fn unit_in_file(source: Source<'_>, exr: &ExrImage) -> Option<f64> {
     if (least..=most).contains(&nits) {
         return Some(f64::from(nits));
     }
-    source.note(&format!("{name} {nits:e} is not a luminance from {least:e} to {most:e} cd/m², and is not looked at"));
+    let nits = significant(nits.into(), 6);
+    source.note(&format!("{name} {nits} is not a luminance from {least:e} to {most:e} cd/m², and is not looked at"));
     None
 }
 
