@@ -291,6 +291,41 @@ fn flat_nodes_keep_their_lamps_and_cameras() {
     }
 }
 
+/// The first set may be of light maps: where all that is rendered lies on another one, that is read.
+#[test]
+fn pictures_are_read_by_the_set_that_they_lie_on() {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let of = |colour: Value, normal: Value, sets: &[usize]| {
+        let mut file = File::textured();
+        for &set in sets {
+            file.attribute(&format!("TEXCOORD_{set}"), &corners.map(|[u, v]| [u + set as f32, v]));
+        }
+        file.document["textures"] = json!([{"source": 0}]);
+        file.document["images"] = json!([{"uri": "data:image/png;base64,AAAA"}]);
+        let material = &mut file.document["materials"][0];
+        material["pbrMetallicRoughness"]["baseColorTexture"] = colour;
+        material["occlusionTexture"] = json!({"index": 0});
+        material["normalTexture"] = normal;
+        file.load().unwrap()
+    };
+    let on = |set: u32| json!({"index": 0, "texCoord": set});
+    let by_transform = json!({"index": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1}}});
+    for (colour, normal, expected, is_told) in [
+        (on(0), on(0), 0.0, false),
+        (on(1), on(1), 1.0, false),
+        (by_transform, on(1), 1.0, false),
+        (on(1), on(0), 1.0, true),
+    ] {
+        let scene = of(colour, normal, &[0, 1]);
+        assert_eq!(scene.meshes[0].uvs[0].x, expected);
+        let told = scene.notes.iter().any(|note| note.contains("several sets of texture coordinates"));
+        assert_eq!(told, is_told, "{:?}", scene.notes);
+    }
+    let missing = of(on(1), on(1), &[0]);
+    assert!(missing.meshes[0].uvs.is_empty());
+    assert!(missing.notes.iter().any(|note| note.contains("no texture coordinates")), "{:?}", missing.notes);
+}
+
 /// Only the first of them was named.
 #[test]
 fn every_hidden_node_is_named_where_nothing_is_left() {

@@ -4,7 +4,7 @@ use super::super::builder::Builder;
 use super::super::error::LoadError;
 use super::buffers::Buffers;
 use super::extension::{ANISOTROPY, CLEARCOAT, Extension, SHEEN, name_of, share};
-use super::textures::{note_coordinates, read_transform};
+use super::textures::read_transform;
 use crate::scene::{
     Alpha, CoatRelief, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Relief, ScalarInput,
     StretchDirection, Surface, TextureLookup, USUAL_IOR,
@@ -112,7 +112,6 @@ impl<'a> Materials<'a> {
     fn relief(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<Option<Relief>, LoadError> {
         let Some(normal) = from.normal_texture() else { return Ok(None) };
         let transform = normal.extension_value("KHR_texture_transform");
-        note_coordinates(builder, Some(u64::from(normal.tex_coord())), transform);
         let transform = transform.map(read_transform);
         let lookup = self.lookup(builder, &normal.texture(), Encoding::Linear, transform, [128, 128, 255, 255])?;
         let strength = if normal.scale().is_finite() { normal.scale() } else { 1.0 };

@@ -6,6 +6,7 @@
 
 mod animation;
 mod buffers;
+mod coordinates;
 mod deform;
 mod document;
 mod extension;
@@ -269,7 +270,9 @@ impl<'a> Reader<'a> {
         let positions: Vec<Vec3> = self.buffers.floats(&positions)?.into_iter().map(Vec3::from_array).collect();
         let vertices = positions.len();
         let normals = self.attribute::<3>(from, &Semantic::Normals, &name, vertices)?;
-        let uvs = self.attribute(from, &Semantic::TexCoords(0), &name, vertices)?;
+        let set = coordinates::set_of(self.document, &from.material(), &name, self.builder)
+            .map_err(|error| LoadError::invalid(self.path, format_args!("\"{name}\": its material: {error}")))?;
+        let uvs = self.attribute(from, &Semantic::TexCoords(set), &name, vertices)?;
         // Tangents mean nothing without normals.
         let tangents = match normals.is_empty() {
             true => Vec::new(),

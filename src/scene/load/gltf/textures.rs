@@ -27,7 +27,6 @@ impl Materials<'_> {
             return Err(extension.wrong(key, "there is no texture of this index"));
         };
         let transform = info.pointer("/extensions/KHR_texture_transform");
-        note_coordinates(builder, info.get("texCoord").map_or(Some(0), Value::as_u64), transform);
         let transform = transform.map(read_transform);
         self.lookup(builder, &texture, encoding, transform, if_missing)
     }
@@ -39,10 +38,7 @@ impl Materials<'_> {
         encoding: Encoding,
     ) -> Result<Option<TextureLookup>, LoadError> {
         let Some(info) = info else { return Ok(None) };
-        let transform = info.texture_transform();
-        let set = transform.as_ref().and_then(gltf::texture::TextureTransform::tex_coord).unwrap_or(info.tex_coord());
-        note_coordinates(builder, Some(u64::from(set)), None);
-        let transform = transform.map(|transform| Transform {
+        let transform = info.texture_transform().map(|transform| Transform {
             offset: Vec2::from_array(transform.offset()),
             rotation: transform.rotation(),
             scale: Vec2::from_array(transform.scale()),
@@ -134,14 +130,6 @@ impl Materials<'_> {
         };
         let bytes = self.embedded.entry(index).or_insert(Arc::new(bytes)).clone();
         Ok(Some(Picture::Memory { name, bytes }))
-    }
-}
-
-/// Says so where a texture asks for coordinates beyond the first set; a transform's own set stands over the texture's.
-pub(super) fn note_coordinates(builder: &mut Builder, set: Option<u64>, transform: Option<&Value>) {
-    let own = transform.and_then(|transform| transform.get("texCoord"));
-    if own.map_or(set, Value::as_u64) != Some(0) {
-        builder.note("Texture coordinate sets beyond the first are not used.");
     }
 }
 
