@@ -3,8 +3,8 @@
 /// Sizes that are written without a power of ten.
 const READABLE: std::ops::Range<f64> = 1e-4..1e7;
 
-/// So many significant digits, all of them before the point, without a tail of zeros: of three "1024", "12.3", "0.0012".
-/// As a power of ten where that is shorter.
+/// So many significant digits, all of them before the point, without a tail of zeros: of three "1024", "12.3",
+/// "0.0012". As a power of ten where that is shorter.
 pub fn significant(value: f64, digits: usize) -> String {
     let after_the_first = digits.saturating_sub(1);
     if value == 0.0 {

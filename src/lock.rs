@@ -1,7 +1,7 @@
 //! Locks between processes: the system's own, which end with their process however it ends.
 //!
-//! They spare double work and keep two processes from writing one film. Every file is there whole or not at all, and a unit
-//! rendered twice gives the same bytes: where a file system has no locks, everybody gets them.
+//! They spare double work and keep two processes from writing one film. Every file is there whole or not at all, and
+//! a unit rendered twice gives the same bytes: where a file system has no locks, everybody gets them.
 
 use std::fs::{File, TryLockError};
 use std::io::{self, Write};

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 const SRGB_TRANSFER: u8 = 13;
 
 /// Linear display RGB, 0 the display's black and 1 its white, of PQ codes (0 to 1) in these primaries;
-/// [`write_png_for`](super::write_png_for) writes Rec.2020's. The display clips each channel at its black and its white;
-/// a colour that Rec.709 does not reach is brought in at the luminance that it has.
+/// [`write_png_for`](super::write_png_for) writes Rec.2020's. The display clips each channel at its black and its
+/// white; a colour that Rec.709 does not reach is brought in at the luminance that it has.
 pub fn decode_pq(codes: &[[f32; 3]], primaries: &Primaries, display: &Display) -> Vec<[f32; 3]> {
     let narrow = primaries.to(&Primaries::REC709).unwrap_or(IDENTITY);
     let relative = |code: f32| display.relative_of_emitted(Eotf::pq_cd_m2(f64::from(code)));

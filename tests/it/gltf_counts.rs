@@ -253,8 +253,8 @@ fn instances_that_do_not_fit_are_refused() {
     }
 }
 
-/// A scale of 0 takes no light away and moves no camera: a lamp was left out without a word, and a camera as if the file
-/// had none.
+/// A scale of 0 takes no light away and moves no camera: a lamp was left out without a word, and a camera as if the
+/// file had none.
 #[test]
 fn flat_nodes_keep_their_lamps_and_cameras() {
     use fechner::scene::Light;

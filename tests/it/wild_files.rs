@@ -243,7 +243,10 @@ fn what_gltf_says_is_kept() {
     assert!(has_note(&morphed, "\"piece\": morph targets of texture coordinates"), "{:?}", morphed.notes);
     let moved = r#""images":[{"uri":"x.png"}],"textures":[{"source":0}],"materials":[{"normalTexture":{"index":0,
         "extensions":{"KHR_texture_transform":{"texCoord":1}}}}],"#;
-    assert!(has_note(&scene(&[("t.gltf", triangle("", ",\"material\":0", moved).as_bytes())]), "no texture coordinates"));
+    assert!(has_note(
+        &scene(&[("t.gltf", triangle("", ",\"material\":0", moved).as_bytes())]),
+        "no texture coordinates"
+    ));
 }
 
 #[test]

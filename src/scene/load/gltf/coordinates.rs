@@ -1,11 +1,11 @@
-//! Which set of texture coordinates a mesh is given. It has one: that on which its material's pictures lie, which may be
-//! another than the first where the first is kept for light maps.
+//! Which set of texture coordinates a mesh is given. It has one: that on which its material's pictures lie, which may
+//! be another than the first where the first is kept for light maps.
 
 use super::super::builder::Builder;
 use serde_json::Value;
 
-/// The number of the set on which a material's pictures lie, by the texture's own or its transform's `texCoord`; that of
-/// its base colour where they are several, which a note says of `mesh`. 0 without pictures.
+/// The number of the set on which a material's pictures lie, by the texture's own or its transform's `texCoord`; that
+/// of its base colour where they are several, which a note says of `mesh`. 0 without pictures.
 pub(super) fn set_of(
     document: &gltf::Document,
     material: &gltf::Material,

@@ -402,8 +402,8 @@ struct Axes {
     up: Vec3,
 }
 
-/// A node's axes, of length 1. Scale means nothing to cameras and lights: an axis that it takes away is perpendicular to
-/// both others.
+/// A node's axes, of length 1. Scale means nothing to cameras and lights: an axis that it takes away is perpendicular
+/// to both others.
 fn axes(to_world: &Affine3A) -> Option<Axes> {
     let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis).try_normalize());
     let z = z.or_else(|| x?.cross(y?).try_normalize())?;
