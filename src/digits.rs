@@ -4,7 +4,7 @@
 const READABLE: std::ops::Range<f64> = 1e-4..1e7;
 
 /// So many significant digits, all of them before the point, without a tail of zeros: of three "1024", "12.3",
-/// "0.0012". As a power of ten where that is shorter.
+/// "0.0012". With a power of ten below 1e-4 and from 1e7 on.
 pub fn significant(value: f64, digits: usize) -> String {
     let after_the_first = digits.saturating_sub(1);
     if value == 0.0 {

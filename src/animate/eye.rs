@@ -56,7 +56,7 @@ impl ShotSettings {
 
     /// Of the gaze, by the slower of its motions from the frame before and to the next, where each of the three has a
     /// single one: half of a jump that ends in a frame, or begins there, would be taken for steady pursuit, and an eye
-    /// that rests there sees 4 times as much.
+    /// that rests there sees more.
     pub fn gaze_velocity_deg_s(&self, frame: u32) -> Option<f64> {
         let at = |frame: u32| match self.gaze.as_ref()?.of_frame(frame) {
             [gaze] => Some(*gaze),

@@ -46,6 +46,13 @@ impl Console {
     }
 }
 
+/// Also of a render that failed: its error would be written above a bar that stays.
+impl Drop for Console {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
 impl Monitor for Console {
     fn looked(&self, progress: &Progress) {
         let visible = progress.visible_share.map_or_else(

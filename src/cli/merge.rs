@@ -44,6 +44,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     let picture = format.is_some().then_some(arguments.output.as_path());
     let films: Vec<_> = arguments.films.iter().map(|film| ("a film", Some(film.as_path()))).collect();
     check_kept(&films, &[("-o", picture), ("--json", arguments.json.as_deref())])?;
+    // Of a sum, too, which may take the place of a film.
     check_distinct(&[("-o", Some(&arguments.output)), ("--json", arguments.json.as_deref())])?;
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;

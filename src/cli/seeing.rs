@@ -212,10 +212,10 @@ mod tests {
     /// Regression: the message was "display file d.toml: display file: TOML parse error at line 2, column 6; …".
     #[test]
     fn a_wrong_display_file_is_named_once_and_by_its_line() {
-        let said = |text: &str| in_display_file("d.toml", Display::from_toml(text).expect_err(text)).to_string();
+        let said = |text: &str| in_display_file("d.toml", text, Display::from_toml(text).expect_err(text)).to_string();
         let curve = said("preset = 'desktop'\neotf = 'gamma22'\n");
         assert!(curve.starts_with("d.toml:2: unknown variant `gamma22`, expected "), "{curve}");
-        assert!(said("white_cd_m2 = -5").starts_with("d.toml: white_cd_m2 is -5; "));
+        assert!(said("white_cd_m2 = -5").starts_with("d.toml:1: white_cd_m2 is -5; "));
         assert!(said("width_px = 1920").starts_with("d.toml: pixels a degree follow from"));
     }
 }

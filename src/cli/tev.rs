@@ -76,7 +76,7 @@ impl Showing {
         }
     }
 
-    /// Shows the finished picture. Called at the end.
+    /// Shows the picture as it is at the end, whatever ended it.
     pub(super) fn ended(&self, state: &RenderState) {
         self.show(&mut self.inner(), state, Stage::AtRest);
     }

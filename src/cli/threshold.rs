@@ -152,7 +152,7 @@ impl Asked {
         let model = model::named(&arguments.model)?;
         arguments.seeing.note_what_is_idle(model.as_ref(), halves.is_some() && judges_colours(model.as_ref()));
         let made_of = halves.as_ref().map_or(MadeOf::Else, |halves| MadeOf::of(&guide, halves));
-        if let Some(told) = made_of.told().filter(|_| model.name() == model::DEFAULT) {
+        if let Some(told) = made_of.told().filter(|_| judges_colours(model.as_ref())) {
             note(&arguments.input, told);
         }
         let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;

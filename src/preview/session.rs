@@ -56,17 +56,19 @@ pub(super) fn run(job: Job, host: &Arc<dyn Host>, options: Options, shared: &Arc
             Ok(Err(_)) => "the program has a defect here; its message stands where fechner view was started".to_owned(),
         };
         shared.publish_status(serde_json::json!({ "kind": "status", "phase": "failed", "error": problem }).to_string());
-        wait_to_load_again(shared);
+        while !is_asked_to_load(shared) {
+            if shared.is_closing() {
+                return;
+            }
+            shared.wait(Duration::from_millis(250));
+        }
         next = host.load();
     }
 }
 
-/// Until somebody saves the scene file or asks to begin anew, or the preview closes.
-fn wait_to_load_again(shared: &Shared) {
-    let is_asked = || shared.take_commands().iter().any(|c| matches!(c, Command::Reload | Command::Restart));
-    while !shared.is_closing() && !is_asked() {
-        shared.wait(Duration::from_millis(250));
-    }
+/// Whether somebody has saved the scene file, or asks to begin anew.
+fn is_asked_to_load(shared: &Shared) -> bool {
+    shared.take_commands().iter().any(|command| matches!(command, Command::Reload | Command::Restart))
 }
 
 struct Session<'a> {

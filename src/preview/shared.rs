@@ -233,7 +233,8 @@ mod tests {
         assert_eq!(left, [Some(2.0), None, Some(3.0), None, Some(5.0)]);
     }
 
-    /// A camera that moves right after a save came threw away the picture that was to be saved, and its own was.
+    /// A camera that moved right after a save came, while the picture was looked at, threw away the picture that was to
+    /// be saved, and its own was. Saves that wait for a first picture still take the next camera's.
     #[test]
     fn what_is_to_be_saved_is_not_thrown_away() {
         let save = || Command::Save { format: PictureFormat::Png };

@@ -103,8 +103,8 @@ fn even_sides(width: u32, height: u32) -> String {
 
 /// Whether writing failed since nobody reads any more.
 fn is_by_the_reader(error: &anyhow::Error) -> bool {
-    let kinds = error.chain().filter_map(|cause| cause.downcast_ref::<io::Error>()).map(io::Error::kind);
-    kinds.into_iter().any(|kind| kind == io::ErrorKind::BrokenPipe)
+    let mut causes = error.chain().filter_map(|cause| cause.downcast_ref::<io::Error>());
+    causes.any(|cause| cause.kind() == io::ErrorKind::BrokenPipe)
 }
 
 fn stream<W: Write>(
@@ -180,13 +180,18 @@ mod tests {
         let odd = format!("b{}:1.mp4", std::process::id());
         make(Path::new(&odd)).expect("written");
         std::fs::remove_file(&odd).expect("a video");
+        // Of three columns and rows, which it wants to be even.
+        let three = ShotSettings { trace: TraceSettings::new(3, 3, 0), ..shot() };
+        fechner::output::write_png(&frame, 3, 3, &[[0.5; 3]; 9]).expect("written");
+        write(Path::new(&odd), VideoFormat::Mp4, [frame.clone()].into_iter(), &fitted, &three).expect("written");
+        std::fs::remove_file(&odd).expect("a video");
+        fechner::output::write_png(&frame, 4, 2, &[[0.5; 3]; 8]).expect("written");
         let taken = folder.path().join("c.mp4");
         std::fs::create_dir(&taken).expect("a folder");
         make(&taken).expect_err("there is a folder");
         assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 2, "nothing is left beside it");
     }
 
-    /// A frame that cannot be read leaves the video that was there, and nothing beside it.
     /// Of an empty stream ffmpeg says that it is empty: why it is says the frame.
     #[test]
     fn a_frame_that_cannot_be_read_is_named() {
@@ -202,6 +207,7 @@ mod tests {
         assert!(format!("{error:#}").contains("a.0.exr"), "{error:#}");
     }
 
+    /// A frame that cannot be read leaves the video that was there, and nothing beside it.
     #[test]
     fn a_video_that_fails_replaces_none() {
         let folder = tempfile::tempdir().expect("a folder");

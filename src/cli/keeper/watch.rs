@@ -119,14 +119,15 @@ impl Monitor for Watch<'_> {
     }
 
     fn failed(&self, state: &RenderState) {
+        // First what is left of it.
+        if let Some(keeper) = &self.keeper {
+            keeper.ended(state);
+        }
         if let Some(audience) = &self.audience {
             audience.failed(state);
         }
         if let Some(tev) = &self.tev {
             tev.ended(state);
-        }
-        if let Some(keeper) = &self.keeper {
-            keeper.ended(state);
         }
     }
 }

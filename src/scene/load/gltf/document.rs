@@ -31,6 +31,11 @@ const KNOWN: &[&str] = &[
     "KHR_texture_transform",
 ];
 
+/// Whether an extension of this name is done, or changes nothing that a rest pose shows.
+pub(super) fn is_known(name: &str) -> bool {
+    KNOWN.contains(&name)
+}
+
 /// The document, checked by the crate, after our own look at its extensions.
 pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<::gltf::Document, LoadError> {
     let json = json.strip_prefix(BYTE_ORDER_MARK).unwrap_or(json);
@@ -38,7 +43,7 @@ pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<:
         let place = Place { file: path.to_owned(), line: Some(error.line()).filter(|&line| line > 0) };
         LoadError::invalid_at(place, format_args!("not valid glTF: {error}"))
     })?;
-    if let Some(refused) = root.extensions_required.iter().find(|name| !KNOWN.contains(&name.as_str())) {
+    if let Some(refused) = root.extensions_required.iter().find(|name| !is_known(name)) {
         let advice = match refused.as_str() {
             "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => "; export it without mesh compression",
             "KHR_texture_basisu" => "; export its textures as PNG, JPEG or WebP",
@@ -56,7 +61,7 @@ pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<:
     let of_nodes = of_nodes.flat_map(|extensions| extensions.others.keys());
     let declared = root.extensions_used.iter();
     let used: BTreeSet<&str> = declared.chain(of_materials).chain(of_nodes).map(String::as_str).collect();
-    for name in used.into_iter().filter(|name| !KNOWN.contains(name)) {
+    for name in used.into_iter().filter(|name| !is_known(name)) {
         let instead = match name {
             "KHR_materials_variants" => "the default variant is rendered",
             "KHR_node_visibility" => "what it hides is rendered",
@@ -74,7 +79,7 @@ pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<:
     check_animations(path, &root)?;
     check_by_crate(path, &root)?;
     note_morphed_attributes(json, &root, builder);
-    note_projections(&root, builder);
+    make_affine(&mut root, builder);
     Ok(::gltf::Document::from_json_without_validation(root))
 }
 
@@ -119,13 +124,21 @@ fn check_by_crate(path: &Path, root: &Root) -> Result<(), LoadError> {
     Err(LoadError::invalid(path, format_args!("not valid glTF: {}{more}", named.join("; "))))
 }
 
-/// Names nodes whose matrix is no affine one, as the format wants them to be.
-fn note_projections(root: &Root, builder: &mut Builder) {
-    for (number, node) in root.nodes.iter().enumerate() {
-        let last_row = node.matrix.map(|matrix| [matrix[3], matrix[7], matrix[11], matrix[15]]);
-        if last_row.is_some_and(|row| row != [0.0, 0.0, 0.0, 1.0]) {
-            builder.note(format!("The matrix of node {number} is taken as if its last row were 0, 0, 0, 1."));
+/// Makes affine what the format wants to be so: the last row of nodes' matrices. Says how many were not.
+fn make_affine(root: &mut Root, builder: &mut Builder) {
+    /// What files round to.
+    const ROUNDING: f32 = 1e-4;
+    let mut others = 0;
+    for matrix in root.nodes.iter_mut().filter_map(|node| node.matrix.as_mut()) {
+        let mut is_other = false;
+        for (place, affine) in [(3, 0.0), (7, 0.0), (11, 0.0), (15, 1.0)] {
+            is_other |= (matrix[place] - affine).abs() > ROUNDING;
+            matrix[place] = affine;
         }
+        others += usize::from(is_other);
+    }
+    if others > 0 {
+        builder.note(format!("{others} of the nodes' matrices are taken as if their last row were 0, 0, 0, 1."));
     }
 }
 

@@ -37,7 +37,7 @@ pub(super) fn places(
         }
         accessors.push((name.as_str(), accessor));
     }
-    let Some(count) = count else { return Err(wrong("it has no attributes".to_owned())) };
+    let Some(count) = count else { return Ok(None) };
     super::super::check_placed(buffers.path(), count)?;
     let mut translations = vec![Vec3::ZERO; count];
     let mut rotations = vec![Quat::IDENTITY; count];

@@ -97,7 +97,7 @@ struct Reader<'a> {
     document: &'a ::gltf::Document,
     buffers: &'a Buffers,
     materials: Materials<'a>,
-    /// Meshes and materials by (mesh, primitive); `None` for primitives that are not rendered.
+    /// Meshes and materials of a mesh's primitives that are rendered, by its index.
     meshes: HashMap<usize, Vec<(MeshId, MaterialId)>>,
     /// Nodes above the current one.
     ancestors: Vec<usize>,

@@ -139,20 +139,30 @@ impl Reader {
     fn name_all(&mut self, element: &Rc<Element>) -> Result<(), LoadError> {
         for child in &element.children {
             if !["ref", "alias"].contains(&child.tag.as_str())
-                && let Some(id) = child.attribute("id")
-                && let Some(other) = self.named.insert(id.to_owned(), Rc::clone(child))
+                && let Some(id) = child.attribute("id").filter(|id| !id.is_empty())
             {
-                return Err(child.error(format_args!("the id \"{id}\" is that of another at {}", other.place())));
+                self.name(id, child, child)?;
             }
             if child.tag == "alias"
                 && let (Some(id), Some(target)) = (child.attribute("as"), child.attribute("id"))
                 && let Some(target) = self.named.get(target).cloned()
             {
-                self.named.insert(id.to_owned(), target);
+                self.name(id, &target, child)?;
             }
             self.name_all(child)?;
         }
         Ok(())
+    }
+
+    /// Gives an element a name that `namer` says.
+    fn name(&mut self, id: &str, element: &Rc<Element>, namer: &Element) -> Result<(), LoadError> {
+        match self.named.insert(id.to_owned(), Rc::clone(element)) {
+            None => Ok(()),
+            Some(other) => {
+                Err(namer
+                    .error(format_args!("the id \"{id}\" is that of another, {}; give each its own", other.place())))
+            }
+        }
     }
 
     /// What a `<ref>` means.

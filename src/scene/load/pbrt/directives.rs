@@ -127,7 +127,7 @@ impl Directive {
         DIRECTIVES.iter().find(|(name, _)| *name == word).map(|&(_, directive)| directive)
     }
 
-    /// Where it has to stand. Of what is not rendered as the file says it does not matter.
+    /// Where it has to stand. Integrator, sampler, filter and options may stand anywhere; pbrt wants them first.
     fn part(self) -> Part {
         match self {
             Self::WorldBegin | Self::Entity(Entity::Camera | Entity::Film) => Part::Options,

@@ -52,6 +52,8 @@ pub(super) struct Fields<'a> {
     path: String,
     line: usize,
     table: &'a DeTable<'a>,
+    /// Whether each key is known to be right.
+    is_checked: bool,
 }
 
 impl<'a> Value<'a> {
@@ -169,7 +171,8 @@ impl<'a> Value<'a> {
 
     /// The elements of a list.
     pub(super) fn array(&self) -> Result<Vec<Value<'a>>, LoadError> {
-        let array = self.value.as_array().ok_or_else(|| match self.is_table() {
+        let is_topmost = !self.path.contains(['.', '[']);
+        let array = self.value.as_array().ok_or_else(|| match self.is_table() && is_topmost {
             true => self.wrong_type(&format!("a list, each of whose entries begins with [[{}]]", self.path)),
             false => self.wrong_type("a list"),
         })?;
@@ -232,13 +235,13 @@ impl<'a> Value<'a> {
     pub(super) fn fields(&self, known: &[&str]) -> Result<Fields<'a>, LoadError> {
         let fields = self.entries()?;
         fields.check_known(known)?;
-        Ok(fields)
+        Ok(Fields { is_checked: true, ..fields })
     }
 
     /// The keys of a table, whatever they are: names that the author chose.
     pub(super) fn entries(&self) -> Result<Fields<'a>, LoadError> {
         let table = self.value.as_table().ok_or_else(|| self.wrong_type("a table"))?;
-        Ok(Fields { source: self.source, path: self.path.clone(), line: self.line, table })
+        Ok(Fields { source: self.source, path: self.path.clone(), line: self.line, table, is_checked: false })
     }
 }
 
@@ -247,12 +250,12 @@ impl<'a> Fields<'a> {
     pub(super) fn root(source: &'a Source<'a>, table: &'a DeTable<'a>, known: &[&str]) -> Result<Self, LoadError> {
         let fields = Self::of_any(source, table);
         fields.check_known(known)?;
-        Ok(fields)
+        Ok(Self { is_checked: true, ..fields })
     }
 
     /// The file's topmost table, whatever its keys are.
     pub(super) fn of_any(source: &'a Source<'a>, table: &'a DeTable<'a>) -> Self {
-        Self { source, path: String::new(), line: 1, table }
+        Self { source, path: String::new(), line: 1, table, is_checked: false }
     }
 
     /// Refuses keys that are not in the list.
@@ -293,7 +296,8 @@ impl<'a> Fields<'a> {
 
     pub(super) fn require(&self, key: &str) -> Result<Value<'a>, LoadError> {
         self.get(key).ok_or_else(|| {
-            let written = nearest(key, self.table.keys().map(|key| key.get_ref().as_ref()));
+            let unsure = self.table.keys().filter(|_| !self.is_checked);
+            let written = nearest(key, unsure.map(|key| key.get_ref().as_ref()));
             let slip = written.map_or_else(String::new, |written| format!("; is \"{written}\" meant for it?"));
             self.error(format_args!("\"{key}\" is missing{slip}"))
         })
