@@ -218,7 +218,7 @@ fn headers_that_say_what_cannot_be_are_told() {
     let (_, said) = fechner(folder.path(), &["compare", "a.hdr", "a.hdr", "--nits-per-unit", "1"]);
     assert!(said.contains("its EXPOSURE says what cannot be, and is not looked at"), "{said}");
     for (name, attribute, expected) in [
-        ("n.exr", (NITS_PER_UNIT, Attribute::Float(-5.0)), "nits_per_unit -5e0 is not a luminance"),
+        ("n.exr", (NITS_PER_UNIT, Attribute::Float(-5.0)), "nits_per_unit -5 is not a luminance"),
         ("d.exr", ("fechner.display", Attribute::Text("{".to_owned())), "its fechner.display cannot be read"),
     ] {
         let mut picture = Picture::new(16, 16);
