@@ -133,9 +133,9 @@ fn all_around(min: Vec3, max: Vec3, intensity: f32) -> LightBounds {
 }
 
 fn point_bounds(light: &Light) -> Option<LightBounds> {
-    match *light {
-        Light::Point { position, intensity } => Some(all_around(position, position, intensity.max_element())),
-        Light::Spot { position, direction, intensity, inner_angle, outer_angle, .. } => {
+    match light {
+        &Light::Point { position, intensity } => Some(all_around(position, position, intensity.max_element())),
+        &Light::Spot { position, direction, intensity, inner_angle, outer_angle, .. } => {
             // What a spot wider than a half-space has beyond it is said by its normals.
             let normal_angle = inner_angle.max(outer_angle - FRAC_PI_2);
             Some(LightBounds {
@@ -145,6 +145,89 @@ fn point_bounds(light: &Light) -> Option<LightBounds> {
                 ..all_around(position, position, intensity.max_element())
             })
         }
+        Light::Photometric { position, from_world, web, per_candela } => {
+            let (largest, axis) = (web.max_cd(), -from_world.row(2));
+            let below = LightCone::around(web.profile(), largest);
+            let above =
+                LightCone::around(web.profile().rev().map(|(angle, intensity)| (PI - angle, intensity)), largest);
+            let (axis, cone) = if above.reach() < below.reach() { (-axis, above) } else { (axis, below) };
+            Some(LightBounds {
+                axis,
+                normal_angle: cone.normal_angle,
+                emission_angle: cone.emission_angle,
+                ..all_around(*position, *position, largest * per_candela.max_element())
+            })
+        }
         Light::Directional { .. } => None,
+    }
+}
+
+/// Where a point shines around an axis: at most by its largest intensity up to the normals' angle, and from there on by
+/// the cosine of what is beyond. In radians.
+struct LightCone {
+    normal_angle: f32,
+    emission_angle: f32,
+}
+
+impl LightCone {
+    /// The narrowest around the axis from which the angles of a profile count, which come with the largest intensity
+    /// that there is at each; they rise.
+    fn around(profile: impl Iterator<Item = (f32, f32)>, largest: f32) -> Self {
+        let (mut normal_angle, mut dark_from, mut before) = (0.0_f32, 0.0_f32, 0.0);
+        for (angle, intensity) in profile {
+            if intensity > 0.0 {
+                normal_angle = normal_angle.max(angle - (intensity / largest).acos());
+            }
+            // Up to the first angle without light it is still falling.
+            if intensity > 0.0 || before > 0.0 {
+                dark_from = angle;
+            }
+            before = intensity;
+        }
+        let normal_angle = normal_angle.max(dark_from - FRAC_PI_2);
+        Self { normal_angle, emission_angle: dark_from - normal_angle }
+    }
+
+    fn reach(&self) -> f32 {
+        self.normal_angle + self.emission_angle
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::PhotometricWeb;
+    use glam::Mat3;
+    use std::sync::Arc;
+
+    /// What the tree takes a lamp for holds what the lamp gives, and is no wider than that: of a Lambertian disk, the
+    /// half-space before it.
+    #[test]
+    fn cones_hold_what_photometric_lamps_give() {
+        let lobes: [(&str, fn(Vec3) -> f32, f32, f32); 4] = [
+            ("downlight", |d| (-d.z).max(0.0), 0.0, FRAC_PI_2),
+            ("uplight", |d| (d.z - 0.5).max(0.0), 0.0, PI / 3.0),
+            ("batwing", |d| if d.z < -0.2 { (1.0 + d.z) * (1.0 + 0.5 * d.x) } else { 0.0 }, 1.36, 1.38),
+            ("ball", |_| 3.0, PI, PI),
+        ];
+        for (name, lobe, normal_angle, reach) in lobes {
+            let web = Arc::new(PhotometricWeb::from_directions(1.0, lobe));
+            let from_world = Mat3::from_rotation_x(0.7) * Mat3::from_rotation_y(2.1);
+            let (position, per_candela) = (Vec3::ONE, Vec3::splat(2.0));
+            let light = Light::Photometric { position, from_world, web: Arc::clone(&web), per_candela };
+            let bounds = point_bounds(&light).expect("a point");
+            assert!((bounds.normal_angle - normal_angle).abs() < 0.02, "{name}: {bounds:?}");
+            assert!((bounds.normal_angle + bounds.emission_angle - reach).abs() < 0.02, "{name}: {bounds:?}");
+            for i in 0..20_000u64 {
+                let unit = |dimension| crate::sampler::unit_of_hash(crate::sampler::hash_words(i, dimension));
+                let z = 1.0 - 2.0 * unit(1);
+                let (sin, cos) = (2.0 * PI * unit(2)).sin_cos();
+                let direction = Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z);
+                let beyond = direction.angle_between(bounds.axis) - bounds.normal_angle;
+                let most = if beyond < bounds.emission_angle { bounds.intensity * beyond.max(0.0).cos() } else { 0.0 };
+                let given = 2.0 * web.intensity_cd(from_world * direction);
+                assert!(given <= most + 1e-3 * bounds.intensity, "{name}: {given} of {most} along {direction}");
+            }
+        }
     }
 }

@@ -4,8 +4,8 @@ use super::{LightProbe, LightReceiver, Lights};
 use crate::geometry::{Ray, World};
 use crate::sampler::{hash_words, unit_of_hash};
 use crate::scene::{
-    Alpha, ColorInput, Environment, Instance, Light, Material, MaterialId, Mesh, MeshId, Parametrisation, Scene,
-    Sphere, SpotFalloff, Surface,
+    Alpha, ColorInput, Environment, Instance, Light, Material, MaterialId, Mesh, MeshId, Parametrisation,
+    PhotometricWeb, Scene, Sphere, SpotFalloff, Surface,
 };
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec3A};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -254,7 +254,7 @@ fn both_sides_of_mis_state_the_same_density() {
     }
 }
 
-/// Spots, points and suns that are far apart are all found, with probabilities that add up to 1.
+/// Spots, points, photometric lamps and suns that are far apart are all found, with probabilities that add up to 1.
 #[test]
 fn choices_without_area_add_up() {
     let mut scene = Scene::default();
@@ -270,6 +270,15 @@ fn choices_without_area_add_up() {
         outer_angle: 0.6,
         falloff: SpotFalloff::Smoothstep,
     });
+    let below = PhotometricWeb::from_directions(5.0, |own| (-own.z).max(0.0));
+    for (position, axis) in [(Vec3::new(2.0, 4.0, 0.0), Vec3::NEG_Y), (Vec3::new(-2.0, 4.0, 0.0), Vec3::Y)] {
+        scene.lights.push(Light::Photometric {
+            position,
+            from_world: PhotometricWeb::from_world(axis, 0.0),
+            web: Arc::new(below.clone()),
+            per_candela: Vec3::splat(10.0),
+        });
+    }
     scene.lights.push(Light::Directional {
         direction: Vec3::NEG_Y,
         irradiance: Vec3::ONE,
@@ -289,7 +298,8 @@ fn choices_without_area_add_up() {
         assert_eq!(entry.0, sample.pdf);
         entry.1 += 1;
     }
-    assert_eq!(seen.len(), 9);
+    // All but the lamp that shines up.
+    assert_eq!(seen.len(), 10);
     for (probability, count) in seen.values() {
         assert!((f64::from(*probability) * f64::from(n) - f64::from(*count)).abs() < 3.0, "{probability} {count}");
     }

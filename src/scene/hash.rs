@@ -3,11 +3,12 @@
 //!
 //! Not for comparing machines of different byte order: large arrays are hashed as they stand in memory.
 
-use super::{FilmDefaults, Scene, Texels, ViewingDefaults};
+use super::{FilmDefaults, Light, PhotometricWeb, Scene, Texels, ViewingDefaults};
 use bytemuck::NoUninit;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::io::{BufWriter, Write};
 use std::mem::take;
+use std::sync::Arc;
 
 /// BLAKE3 of everything in a scene that samples depend on.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -95,6 +96,13 @@ pub fn content_hash(scene: &Scene) -> ContentHash {
     if let Some(environment) = &mut rest.environment {
         hash_array(&mut hasher, &take(&mut environment.texels));
     }
+    let dark = Arc::<PhotometricWeb>::default();
+    for light in &mut rest.lights {
+        if let Light::Photometric { web, .. } = light {
+            web.arrays().into_iter().for_each(|array| hash_array(&mut hasher, array));
+            *web = Arc::clone(&dark);
+        }
+    }
     let mut text = BufWriter::with_capacity(1 << 16, &mut hasher);
     write!(text, "{rest:?}").and_then(|()| text.flush()).expect("a hasher takes all bytes");
     drop(text);
@@ -121,11 +129,19 @@ mod tests {
     use super::*;
     use crate::scene::load::{LoadOptions, load};
     use std::path::Path;
-    use std::sync::Arc;
 
     fn scene(file: &str) -> Scene {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
         load(&path, &LoadOptions::default()).expect("one of our own scenes loads")
+    }
+
+    /// A lamp of two planes whose last one begins at `vertical_deg`, of 1 cd but for the last value.
+    fn photometric(vertical_deg: f32, last_cd: f32) -> Light {
+        let mut intensity_cd = vec![1.0; 4];
+        intensity_cd[3] = last_cd;
+        let web = Arc::new(PhotometricWeb::new(vec![vertical_deg, 180.0], vec![0.0, 360.0], intensity_cd));
+        let (position, per_candela) = (glam::Vec3::ZERO, glam::Vec3::ONE);
+        Light::Photometric { position, from_world: glam::Mat3::IDENTITY, web, per_candela }
     }
 
     #[test]
@@ -142,7 +158,7 @@ mod tests {
     #[test]
     fn every_change_changes_the_hash() {
         type Change = fn(&mut Scene);
-        let changes: [Change; 16] = [
+        let changes: [Change; 19] = [
             |_| {},
             |s| s.nits_per_unit *= 1.0 + f64::EPSILON,
             |s| s.camera.position.x += 1e-6,
@@ -160,7 +176,10 @@ mod tests {
             },
             |s| s.meshes.swap(0, 1),
             |s| s.meshes[0].uvs.clear(),
-            |s| s.lights.push(crate::scene::Light::Point { position: glam::Vec3::ZERO, intensity: glam::Vec3::ONE }),
+            |s| s.lights.push(Light::Point { position: glam::Vec3::ZERO, intensity: glam::Vec3::ONE }),
+            |s| s.lights.push(photometric(0.0, 1.0)),
+            |s| s.lights.push(photometric(0.0, 1.0 + f32::EPSILON)),
+            |s| s.lights.push(photometric(f32::EPSILON, 1.0)),
             |s| s.environment.iter_mut().for_each(|e| e.scale *= 1.0 + f32::EPSILON),
         ];
         let base = scene("still-life.toml");

@@ -1,7 +1,9 @@
 //! Lights that are no surfaces, in scene units: a photometric amount over [`super::Scene::nits_per_unit`].
 
-use glam::Vec3;
+use super::PhotometricWeb;
+use glam::{Mat3, Vec3};
 use std::f32::consts::TAU;
+use std::sync::Arc;
 
 /// A light that is no surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +29,17 @@ pub enum Light {
         outer_angle: f32,
         /// What happens between the two.
         falloff: SpotFalloff,
+    },
+    /// Shines by a photometric web.
+    Photometric {
+        /// World position.
+        position: Vec3,
+        /// Rotation from the world's space into the web's, as [`PhotometricWeb::from_world`] gives it.
+        from_world: Mat3,
+        /// Luminous intensity by direction; lamps of one kind share it.
+        web: Arc<PhotometricWeb>,
+        /// Intensity, as that of a point, for each cd of the web: the lamp's colour, and what it is dimmed to.
+        per_candela: Vec3,
     },
     /// Shines from infinitely far away: a direction, or a disc of uniform radiance around it such as the sun's, which
     /// is then seen where a ray meets no surface.

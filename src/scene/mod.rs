@@ -9,6 +9,7 @@ mod light;
 mod material;
 mod metal_roughness;
 mod motion;
+mod photometric_web;
 pub(crate) mod pictured_edges;
 mod relief;
 mod roughness;
@@ -25,6 +26,7 @@ pub use light::{Light, SpotFalloff};
 pub use material::{Alpha, Material, StretchDirection};
 pub use metal_roughness::{CoatRelief, MetalRoughness};
 pub use motion::{Motion, MotionKey, Pose};
+pub use photometric_web::PhotometricWeb;
 pub use relief::{HeightMap, HeightUnit, Relief};
 pub use roughness::{Distribution, Roughness, RoughnessScale};
 pub use surface::Surface;
@@ -81,7 +83,8 @@ pub struct Scene {
     /// Whether the second axis of normal maps is normal × growing u whichever way v runs, as in pbrt and Mitsuba;
     /// else it is that of falling v.
     pub bitangent_ignores_v: bool,
-    /// Point, spot and directional lights, and the sun's disc. Area lights are surfaces whose material emits.
+    /// Point, spot, photometric and directional lights, and the sun's disc. Area lights are surfaces whose material
+    /// emits.
     pub lights: Vec<Light>,
     /// What rays see that hit nothing; `None` is black.
     pub environment: Option<Environment>,

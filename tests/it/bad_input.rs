@@ -130,6 +130,29 @@ const TRIANGLE_GLTF: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"
 "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
 
 #[test]
+fn damaged_photometric_files_never_panic() {
+    let place = tempfile::tempdir().unwrap();
+    let (scene, lamp) = (place.path().join("scene.toml"), place.path().join("lamp.ies"));
+    let text = "[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"m\"\n[materials.m]\n\
+                type = \"mirror\"\n[[lights]]\ntype = \"photometric\"\nfile = \"lamp.ies\"\nposition = [0, 3, 0]\n";
+    std::fs::write(&scene, text).unwrap();
+    let good = "IESNA:LM-63-2002\nTILT=INCLUDE\n1\n2\n0 90\n1 0.9\n1 1000 1 3 2 1 2 0 0 0\n1 1 20\n0 45 90\n0 90\n\
+                100 50 0\n100 70 0\n";
+    std::fs::write(&lamp, good).unwrap();
+    assert_eq!(load(&scene, &LoadOptions::default()).unwrap().lights.len(), 1);
+    survive_damage(&scene, &lamp, good.as_bytes());
+    // Every number replaced by ones that are too large, negative and not whole.
+    for (start, _) in good.match_indices(|c: char| c.is_ascii_digit()) {
+        for wrong in ["4294967295", "99999999999999999999", "-1", "1e39", "0.5", "nan", "", "1", "36001"] {
+            std::fs::write(&lamp, format!("{}{wrong}{}", &good[..start], &good[start + 1..])).unwrap();
+            if let Err(error) = load(&scene, &LoadOptions::default()) {
+                assert!(!error.to_string().contains('\n'), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
 fn damaged_scenes_of_other_renderers_never_panic() {
     let place = tempfile::tempdir().unwrap();
     for ending in ["pbrt", "xml"] {

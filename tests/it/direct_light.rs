@@ -7,8 +7,8 @@ use fechner::geometry::Ray;
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::scene::load::shapes;
 use fechner::scene::{
-    Alpha, ColorInput, Environment, Instance, Light, MaterialId, MeshId, Parametrisation, Roughness, ScalarInput,
-    Scene, SpotFalloff, Surface, Texels, Texture, TextureId, TextureLookup, Wrap,
+    Alpha, ColorInput, Environment, Instance, Light, MaterialId, MeshId, Parametrisation, PhotometricWeb, Roughness,
+    ScalarInput, Scene, SpotFalloff, Surface, Texels, Texture, TextureId, TextureLookup, Wrap,
 };
 use glam::{Affine3A, Mat3, Mat3A, Vec2, Vec3, vec3a};
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -255,6 +255,48 @@ fn lights_without_area_follow_their_laws() {
         is_of_sky: false,
     });
     assert_irradiance(sun, 0.0, 1.6, "directional");
+}
+
+/// Intensities that have closed forms: I₀ cos γ, which on a plane below gives I₀ h²/d⁴, and one that depends on C and
+/// shines up too, of a lamp that is aimed and turned.
+#[test]
+fn photometric_lights_follow_their_webs() {
+    let place = Vec3::new(0.0, 2.0, 0.0);
+    let lamp = |web: &PhotometricWeb, axis: Vec3, spin: f32| Light::Photometric {
+        position: place,
+        from_world: PhotometricWeb::from_world(axis, spin),
+        web: Arc::new(web.clone()),
+        per_candela: Vec3::splat(0.5),
+    };
+    let under = |lights: &[Light]| {
+        let mut scene = floor();
+        scene.lights.extend_from_slice(lights);
+        scene
+    };
+    let disk = PhotometricWeb::from_directions(1.0, |own| 16.0 * (-own.z).max(0.0));
+    let x = 1.5f32;
+    let distance_squared = x * x + 4.0;
+    let irradiance = |intensity: f32| 0.5 * intensity * 2.0 / distance_squared.powf(1.5);
+    let expected = irradiance(16.0 * 2.0 / distance_squared.sqrt());
+    assert!((expected / (8.0 * 4.0 / distance_squared.powi(2)) - 1.0).abs() < 1e-6);
+    assert_irradiance(under(&[lamp(&disk, Vec3::NEG_Y, 0.3)]), x, expected, "Lambertian lamp");
+
+    // In the lamp's space: x is C = 0°, y is C = 90°, z is up from the lamp.
+    let uneven = |own: Vec3| 8.0 + 4.0 * own.x + 3.0 * own.y + 2.0 * own.z;
+    let web = PhotometricWeb::from_directions(1.0, uneven);
+    let towards = (Vec3::new(x, 0.0, 0.0) - place).normalize();
+    // Straight down, turned by 90°: C = 0 along −z, C = 90° along −x.
+    let down = uneven(Vec3::new(-towards.z, -towards.x, towards.y));
+    assert_irradiance(under(&[lamp(&web, Vec3::NEG_Y, 0.5 * PI)]), x, irradiance(down), "turned lamp");
+    // Tilted by 60° towards +x: C = 0 is 30° beside the vertical, away from +x.
+    let (sin, cos) = 60f32.to_radians().sin_cos();
+    let axis = Vec3::new(sin, -cos, 0.0);
+    let own = Vec3::new(towards.dot(Vec3::new(cos, sin, 0.0)), -towards.z, -towards.dot(axis));
+    assert_irradiance(under(&[lamp(&web, axis, 0.0)]), x, irradiance(uneven(own)), "tilted lamp");
+    // Beside lamps that the choice might take it for.
+    let up = uneven(Vec3::new(-towards.x, -towards.z, -towards.y));
+    let all = [lamp(&web, Vec3::Y, 0.0), lamp(&disk, Vec3::NEG_Y, 0.0), lamp(&disk, Vec3::Y, 0.0)];
+    assert_irradiance(under(&all), x, irradiance(up) + expected, "lamps that look up and down");
 }
 
 /// A floor under sheets at heights of 0.25, 0.5, …

@@ -20,7 +20,7 @@
 //! - `animate`: the frames of a shot in any order and from any process, kept when they are there
 //! - `animate_mishaps`: shots that are refused before anything is rendered, or named
 //! - `bad_input`: bad scene files, and our own ones
-//! - `own_format`: lamps of a luminous power, keys that change nothing, files beside the scene
+//! - `own_format`: lamps of a luminous power, photometric ones, keys that change nothing, files beside the scene
 //! - `importance`: samples go where a user's map sends them
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `mutations`: thousands of damaged files a format, in a child process (ignored)

@@ -1,9 +1,10 @@
-//! Our own format: what lamps of a luminous power emit, keys that change nothing, and files that are found from the
-//! scene's folder.
+//! Our own format: what lamps of a luminous power and photometric ones emit, keys that change nothing, and files that
+//! are found from the scene's folder.
 
 use fechner::scene::hash::content_hash;
 use fechner::scene::load::{LoadOptions, load};
-use fechner::scene::{Alpha, Scene, Surface};
+use fechner::scene::{Alpha, Light, Scene, Surface};
+use glam::Vec3;
 
 /// A scene in a folder of its own, at a time in seconds.
 fn at(text: &str, seconds: f64) -> Result<Scene, String> {
@@ -227,6 +228,7 @@ fn the_example_of_the_format_loads() {
         grey.save(folder.path().join(format!("textures/{name}.png"))).unwrap();
     }
     image::Rgb32FImage::from_pixel(2, 2, image::Rgb([1.0; 3])).save(folder.path().join("sky.hdr")).unwrap();
+    std::fs::write(folder.path().join("downlight.ies"), LAMP).unwrap();
     std::fs::write(folder.path().join("meshes/bunny.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     let path = folder.path().join("example.toml");
     let bumpy = example.replace("\nnormal_map =", "\n# normal_map =").replace("\n# bump_map =", "\nbump_map =");
@@ -258,6 +260,106 @@ fn slips_in_operators_and_displays_have_their_place() {
     }
     write("q.fechner.toml", "[view]\noperator = \"agx\"\ndisplay = \"own.toml\"\n");
     load(&folder.path().join("q.obj"), &LoadOptions::default()).unwrap();
+}
+
+/// A lamp of 400 cd straight down, 200 cd at 60°, and more towards C = 90°.
+const LAMP: &str = "IESNA:LM-63-2002\n[TEST] made up\nTILT=NONE\n1 -1 2 3 5 1 2 0 0 0\n1 1 20\n0 60 90\n\
+                    0 90 180 270 360\n200 100 0\n200 140 0\n200 100 0\n200 60 0\n200 100 0\n";
+
+/// A scene under photometric lamps in a folder with their file, at a time in seconds.
+fn under_lamps(lamps: &str, seconds: f64) -> Result<Scene, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.toml");
+    std::fs::write(folder.path().join("lamp.ies"), LAMP).unwrap();
+    std::fs::write(folder.path().join("dark.ies"), LAMP.replace(" 2 3 5", " 1e-60 3 5")).unwrap();
+    std::fs::write(folder.path().join("negative.ies"), LAMP.replace("140", "-140")).unwrap();
+    std::fs::write(folder.path().join("broken.ies"), LAMP.replace("140", "bright")).unwrap();
+    std::fs::write(&path, format!("nits_per_unit = 10\n{}{lamps}", square("type = \"mirror\""))).unwrap();
+    let options = LoadOptions { frame_time: seconds, ..LoadOptions::default() };
+    let own = |text: String| text.replace(&format!("{}/", folder.path().display()), "");
+    let mut scene = load(&path, &options).map_err(|error| own(error.to_string()))?;
+    scene.notes = scene.notes.into_iter().map(own).collect();
+    Ok(scene)
+}
+
+/// What a photometric lamp gives in cd in a direction of the world, by channel.
+fn candela(scene: &Scene, lamp: usize, direction: Vec3) -> Vec3 {
+    let Light::Photometric { from_world, web, per_candela, .. } = &scene.lights[lamp] else {
+        panic!("{:?}", scene.lights)
+    };
+    *per_candela * web.intensity_cd(*from_world * direction.normalize()) * scene.nits_per_unit as f32
+}
+
+#[test]
+fn photometric_lamps_have_the_candela_of_their_file() {
+    let lamp = "[[lights]]\ntype = \"photometric\"\nfile = \"lamp.ies\"\nposition = [0, 3, 0]\n";
+    let of = |keys: &str| under_lamps(&format!("{lamp}{keys}"), 0.5).unwrap_or_else(|error| panic!("{keys}: {error}"));
+    let near = |found: Vec3, expected: Vec3, what: &str| {
+        assert!((found - expected).abs().max_element() < 2e-4 * expected.max_element(), "{what}: {found} {expected}");
+    };
+    let (sin, cos) = 60f32.to_radians().sin_cos();
+    let (ahead, right) = (Vec3::new(0.0, -cos, -sin), Vec3::new(sin, -cos, 0.0));
+    for (keys, direction, expected) in [
+        ("", Vec3::NEG_Y, 400.0),
+        ("", right, 200.0),
+        ("", ahead, 280.0),
+        ("rotation_deg = 90", ahead, 200.0),
+        ("rotation_deg = -90", right, 280.0),
+        ("scale = 0.5", ahead, 140.0),
+        ("direction = [1, 0, 0]", Vec3::X, 400.0),
+        ("target = [2, 3, 0]", Vec3::X, 400.0),
+        // Sideways, C = 0 is up and C = 90° to the right of who looks along.
+        ("target = [2, 3, 0]", Vec3::new(cos, 0.0, -sin), 280.0),
+        ("target = [2, 3, 0]", Vec3::new(cos, sin, 0.0), 200.0),
+        ("keyframes = [ { time = 0, rotation_deg = 0 }, { time = 1, rotation_deg = -180 } ]", right, 280.0),
+        ("keyframes = [ { time = 0, scale = 0 }, { time = 1, scale = 2 } ]", ahead, 280.0),
+    ] {
+        near(candela(&of(keys), 0, direction), Vec3::splat(expected), keys);
+    }
+    // A colour keeps the candela; lumen are those of the whole web.
+    let red = of("color = [1, 0, 0]");
+    near(candela(&red, 0, ahead), Vec3::X * 280.0 / 0.2126, "red");
+    let Light::Photometric { web, .. } = &red.lights[0] else { panic!("{:?}", red.lights) };
+    let dimmed = of("power_lm = 100");
+    near(candela(&dimmed, 0, ahead), Vec3::splat(280.0 * 100.0 / web.flux_lm() as f32), "lumen");
+    // By the trapezoids of each plane: their mean is that of C = 0. ∫ sin: 400 to 200 cd until 60°, to 0 until 90°.
+    let (sin, angle) = (f64::from(sin), std::f64::consts::FRAC_PI_3);
+    let expected =
+        std::f64::consts::TAU * (400.0 - 200.0 * 0.5 - 200.0 * sin / angle + 200.0 * 0.5 - 400.0 * (1.0 - sin) / angle);
+    assert!((web.flux_lm() / expected - 1.0).abs() < 1e-6, "{} {expected}", web.flux_lm());
+    // Lamps of one kind share their web.
+    let two = of(lamp);
+    let [Light::Photometric { web: a, .. }, Light::Photometric { web: b, .. }] = &two.lights[..] else { panic!() };
+    assert!(std::sync::Arc::ptr_eq(a, b));
+    assert_ne!(content_hash(&of("")), content_hash(&of("rotation_deg = 1")));
+    let negative = under_lamps(&lamp.replace("lamp.ies", "negative.ies"), 0.0).unwrap();
+    assert_eq!(negative.notes[0], "negative.ies:9: intensities below 0 are taken as 0.");
+}
+
+#[test]
+fn slips_in_photometric_lamps_are_told() {
+    let lamp = "[[lights]]\ntype = \"photometric\"\nposition = [0, 3, 0]\n";
+    for (keys, expected) in [
+        ("", "s.toml:7: lights[0]: \"file\" is missing"),
+        ("file = \"none.ies\"", "s.toml:10: none.ies: no such file"),
+        ("file = \"s.toml\"", "s.toml:10: s.toml: no line TILT=NONE"),
+        ("file = \"broken.ies\"", "s.toml:10: broken.ies:9: expected 5 times 3 intensities, found \"bright\""),
+        (
+            "file = \"lamp.ies\"\nrotaton_deg = 1",
+            "unknown key \"rotaton_deg\" in lights[0]; did you mean \"rotation_deg\"?",
+        ),
+        ("file = \"lamp.ies\"\nintensity_cd = 1", "unknown key \"intensity_cd\""),
+        ("file = \"lamp.ies\"\nscale = 1\npower_lm = 1", "\"power_lm\" and \"scale\" exclude each other"),
+        ("file = \"lamp.ies\"\nscale = -1", "lights[0].scale: must be at least 0, not -1"),
+        ("file = \"dark.ies\"\npower_lm = 1", "lights[0].power_lm: a file without any light cannot be scaled to it"),
+        ("file = \"lamp.ies\"\ntarget = [0, 3, 0]", "lights[0].target: is the light's own position"),
+        ("file = \"lamp.ies\"\ncolor = 0", "lights[0].color: a colour of light must not be black"),
+    ] {
+        let message = under_lamps(&format!("{lamp}{keys}\n"), 0.0).expect_err(keys);
+        assert!(message.contains(expected), "{keys}: {message}");
+    }
+    let message = under_lamps(&lamp.replace("photometric", "photmetric"), 0.0).unwrap_err();
+    assert!(message.contains("did you mean \"photometric\"?"), "{message}");
 }
 
 /// A file that somebody has only begun says nothing.

@@ -2,9 +2,10 @@
 
 use crate::support::{has_note, write_and_load};
 use fechner::scene::load::{LoadOptions, load};
-use fechner::scene::{Alpha, FilmDefaults, Projection, Scene, ScreenWindow, Surface};
+use fechner::scene::{Alpha, FilmDefaults, Light, Parametrisation, Projection, Scene, ScreenWindow, Surface};
 use fechner_perception::eotf::srgb_to_linear;
 use glam::{Vec2, Vec3};
+use std::f32::consts::PI;
 use std::path::Path;
 
 const SQUARE: &str =
@@ -493,4 +494,34 @@ fn notes_of_many_lines_are_one() {
     let notes: Vec<&String> = scene.notes.iter().filter(|note| note.contains("odd")).collect();
     assert_eq!(notes.len(), 1, "{notes:?}");
     assert!(notes[0].ends_with("\"float odd\" (and 2 more like it)."), "{notes:?}");
+}
+
+/// A goniometric light has the intensity that its picture has in a direction, y up in it, and so many lumen.
+#[test]
+fn goniometric_lights_shine_by_their_pictures() {
+    let folder = folder();
+    let size = 64u32;
+    // 1 on the mean of the channels, brighter towards +x and up.
+    let pattern = |d: Vec3| 1.0 + 0.5 * d.x + 0.25 * d.z;
+    let texel = |x: u32, y: u32| {
+        let uv = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / size as f32;
+        image::Rgb([3.0 * pattern(Parametrisation::EqualArea.to_direction(uv)), 0.0, 0.0])
+    };
+    image::Rgb32FImage::from_fn(size, size, texel).save(folder.path().join("lamp.hdr")).unwrap();
+    for (amount, per_unit) in [("\"float scale\" 8", 8.0), ("\"float power\" 100", 100.0 / (4.0 * PI))] {
+        let light = format!(
+            "Translate 0 3 0 Rotate 90 0 1 0 LightSource \"goniometric\" \"rgb I\" [1 1 1] {amount} \"string filename\" \"lamp.hdr\""
+        );
+        let scene = try_load(folder.path(), "", &format!("AttributeBegin {light} AttributeEnd {SQUARE}")).unwrap();
+        let [Light::Photometric { position, from_world, web, per_candela }] = &scene.lights[..] else {
+            panic!("{:?}", scene.lights)
+        };
+        assert_eq!(*position, Vec3::Y * 3.0);
+        for direction in [Vec3::X, Vec3::NEG_Z, Vec3::Y, Vec3::new(0.6, -0.48, 0.64), Vec3::NEG_Y] {
+            // pbrt's quarter turn about y takes its x to −z; the picture's z is up.
+            let expected = per_unit * (1.0 - 0.5 * direction.z + 0.25 * direction.y);
+            let found = per_candela.x * web.intensity_cd(*from_world * direction);
+            assert!((found / expected - 1.0).abs() < 0.01, "{amount} {direction}: {found} {expected}");
+        }
+    }
 }

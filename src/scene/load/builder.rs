@@ -340,6 +340,7 @@ fn is_lit(scene: &Scene, weakest: f32) -> bool {
     };
     let shines = |light: &Light| match light {
         Light::Point { intensity, .. } | Light::Spot { intensity, .. } => intensity.max_element() > 0.0,
+        Light::Photometric { web, per_candela, .. } => web.max_cd() * per_candela.max_element() > 0.0,
         Light::Directional { irradiance, .. } => irradiance.max_element() > 0.0,
     };
     let surrounded = scene.environment.as_ref().is_some_and(|environment| {

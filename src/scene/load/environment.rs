@@ -32,10 +32,10 @@ pub fn from_file(
 /// Where the file cannot be read, or an equal-area picture is not square.
 pub fn read(path: &Path, parametrisation: Parametrisation, notes: &mut Vec<String>) -> Result<Environment, LoadError> {
     let picture = texture::decode_bytes(&super::files::read(path)?, path, Encoding::Srgb, Values::Colours)?;
-    notes.extend(picture.notes.iter().map(|note| format!("Environment {}: {note}.", path.display())));
+    notes.extend(picture.notes.iter().map(|note| format!("{}: {note}.", path.display())));
     if parametrisation == Parametrisation::EqualArea && picture.width != picture.height {
         let problem = format_args!(
-            "an equal-area environment is square, and the picture has {} x {} pixels",
+            "an equal-area picture is square, and this one has {} x {} pixels",
             picture.width, picture.height
         );
         return Err(LoadError::invalid(path, problem));

@@ -28,6 +28,7 @@ mod error;
 mod files;
 mod framing;
 mod gltf;
+mod ies;
 mod lines;
 pub mod metals;
 mod mitsuba;

@@ -8,7 +8,7 @@ use super::super::{environment, luminance};
 use super::Reader;
 use super::inputs::Meaning;
 use super::parameters::Parameters;
-use crate::scene::{ColorInput, Encoding, Environment, Light, Parametrisation, SpotFalloff, Wrap};
+use crate::scene::{ColorInput, Encoding, Environment, Light, Parametrisation, PhotometricWeb, SpotFalloff, Wrap};
 use glam::{Affine3A, Vec3};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
@@ -53,16 +53,7 @@ impl Reader<'_> {
                 let environment = self.infinite(parameters, &to_world)?;
                 self.add_environment(environment);
             }
-            "goniometric" => {
-                self.builder.note(format!(
-                    "{}: a goniometric light's pattern is not rendered: it shines alike in all directions.",
-                    parameters.place()
-                ));
-                parameters.string("filename")?;
-                let intensity = self.light_color(parameters, "I", 2.0 * TAU)?;
-                let position = Vec3::from(to_world.translation);
-                self.builder.lights.push(Light::Point { position, intensity });
-            }
+            "goniometric" => self.goniometric(parameters, &to_world)?,
             "projection" => return Err(parameters.unsupported("lights of type \"projection\" are not rendered")),
             other => {
                 let known = ["point", "spot", "distant", "infinite", "goniometric"];
@@ -114,6 +105,33 @@ impl Reader<'_> {
             outer_angle,
             falloff,
         });
+        Ok(())
+    }
+
+    /// A point whose intensity is a picture's: the mean of R, G and B in pbrt's equal-area square, whose z is the
+    /// light's y (pbrt-v4, `GoniometricLight::Create`).
+    fn goniometric(&mut self, parameters: &Parameters, to_world: &Affine3A) -> Result<(), LoadError> {
+        let position = Vec3::from(to_world.translation);
+        let Some(file) = parameters.string("filename")? else {
+            let note = "a goniometric light without a picture shines alike in all directions.";
+            self.builder.note(format!("{}: {note}", parameters.place()));
+            let intensity = self.light_color(parameters, "I", 2.0 * TAU)?;
+            self.builder.lights.push(Light::Point { position, intensity });
+            return Ok(());
+        };
+        let file = self.file(file);
+        let picture = environment::read(&file, Parametrisation::EqualArea, &mut self.builder.notes)
+            .map_err(|error| error.referenced_from(parameters.place()))?;
+        let mean = picture.texels.iter().map(|texel| f64::from(texel.element_sum()) / 3.0).sum::<f64>();
+        let mean = (mean / picture.texels.len() as f64) as f32;
+        // A texel is about 203°/width across (4π/width² sr): a quarter of that, or of a degree where it is smaller.
+        let step_deg = 180.0 / (4 * picture.width).clamp(180, 720) as f32;
+        let web = PhotometricWeb::from_directions(step_deg, |direction| {
+            picture.radiance(Vec3::new(direction.x, direction.z, direction.y)).element_sum() / 3.0
+        });
+        let per_candela = self.light_color(parameters, "I", (2.0 * TAU * mean).max(f32::MIN_POSITIVE))?;
+        let from_world = environment::rotation_of(to_world).transpose();
+        self.builder.lights.push(Light::Photometric { position, from_world, web: Arc::new(web), per_candela });
         Ok(())
     }
 

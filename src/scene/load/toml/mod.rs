@@ -160,9 +160,11 @@ impl<'a> Context<'a> {
     }
 
     fn read_lights(&mut self, root: &Fields<'a>) -> Result<(), LoadError> {
+        let mut reader = light::Reader::new(self.folder, self.builder.nits_per_unit);
         for value in root.get_or("lights", Vec::new(), Value::array)? {
-            self.builder.lights.push(light::read(&value, self.builder.nits_per_unit)?);
+            self.builder.lights.push(reader.read(&value)?);
         }
+        reader.notes.into_iter().for_each(|note| self.builder.note(note));
         Ok(())
     }
 

@@ -87,9 +87,11 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
             scene.surround(surroundings.environment, surroundings.sun);
         }
         if let Some(list) = root.get("lights") {
+            let mut reader = light::Reader::new(folder, scene.nits_per_unit);
             for value in list.array()? {
-                scene.lights.push(light::read(&value, scene.nits_per_unit)?);
+                scene.lights.push(reader.read(&value)?);
             }
+            scene.notes.append(&mut reader.notes);
         }
         // What was assumed is no longer true.
         if brings_camera {
