@@ -200,11 +200,14 @@ mod tests {
     use glam::Mat3;
     use std::sync::Arc;
 
+    /// Name, intensity by direction, the cone's angle of normals and its reach in radians.
+    type Lobe = (&'static str, fn(Vec3) -> f32, f32, f32);
+
     /// What the tree takes a lamp for holds what the lamp gives, and is no wider than that: of a Lambertian disk, the
     /// half-space before it.
     #[test]
     fn cones_hold_what_photometric_lamps_give() {
-        let lobes: [(&str, fn(Vec3) -> f32, f32, f32); 4] = [
+        let lobes: [Lobe; 4] = [
             ("downlight", |d| (-d.z).max(0.0), 0.0, FRAC_PI_2),
             ("uplight", |d| (d.z - 0.5).max(0.0), 0.0, PI / 3.0),
             ("batwing", |d| if d.z < -0.2 { (1.0 + d.z) * (1.0 + 0.5 * d.x) } else { 0.0 }, 1.36, 1.38),
