@@ -1,4 +1,4 @@
-//! Writes the meshes, textures and skies under `scenes/`, and the scene files that are too long to write by hand.
+//! Writes the meshes, textures, skies and photometry under `scenes/`, and the scene files that are too long to write by hand.
 //!
 //! `cargo run --release -p fechner-make-scenes` writes them all anew; they are committed, so nobody has to.
 //! Everything is a pure function of the numbers in this program: running it twice gives the same files.
@@ -8,6 +8,7 @@ mod many_lights;
 mod mesh;
 mod meshes;
 mod noise;
+mod photometry;
 mod raster;
 mod sky;
 mod textures;
@@ -24,6 +25,7 @@ fn main() -> anyhow::Result<()> {
     textures::write_all(&folder("textures")?)?;
     meshes::write_all(&folder("meshes")?)?;
     sky::write_all(&folder("skies")?)?;
+    photometry::write_all(&folder("photometry")?)?;
     std::fs::write(scenes.join("many-lights.toml"), many_lights::scene())?;
     Ok(())
 }
