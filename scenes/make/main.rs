@@ -1,4 +1,5 @@
-//! Writes the meshes, textures, skies and photometry under `scenes/`, and the scene files that are too long to write by hand.
+//! Writes the meshes, textures, skies and photometry under `scenes/`, and the scene files that are too long to write
+//! by hand.
 //!
 //! `cargo run --release -p fechner-make-scenes` writes them all anew; they are committed, so nobody has to.
 //! Everything is a pure function of the numbers in this program: running it twice gives the same files.
