@@ -27,11 +27,12 @@ impl Default for PhotometricWeb {
 }
 
 impl PhotometricWeb {
-    /// A web of planes at the horizontal angles, each with an intensity for every vertical angle; all angles rise, and
-    /// of two planes and more the last is the first again, 360° on.
+    /// A web of planes at the horizontal angles, each with an intensity for every vertical angle, at least 0; of two
+    /// planes and more the last is the first again, which is not checked.
     ///
     /// # Panics
-    /// Where that does not hold: who reads files has told their authors before.
+    /// Unless all angles rise, horizontal ones by 360° in all, and there is an intensity for each pair: who reads files
+    /// has told their authors before.
     pub fn new(vertical_deg: Vec<f32>, horizontal_deg: Vec<f32>, intensity_cd: Vec<f32>) -> Self {
         let rises = |angles: &[f32]| angles.windows(2).all(|pair| pair[0] < pair[1]);
         assert!(rises(&vertical_deg) && rises(&horizontal_deg), "angles must rise");

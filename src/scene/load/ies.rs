@@ -7,13 +7,17 @@
 
 use super::error::{LoadError, Place};
 use super::files;
+use crate::digits::significant;
 use crate::scene::PhotometricWeb;
 use std::path::Path;
 
 /// Most angles in one direction: a hundredth of a degree around the lamp.
 const MAX_ANGLES: usize = 36_001;
-/// Most intensities: a web in steps of a fifth of a degree.
+/// Most intensities of a file: a web in steps of a fifth of a degree. Symmetries make up to four times as many of them,
+/// 32 MB.
 const MAX_INTENSITIES: usize = 2_000_000;
+/// Least difference of two angles in degrees: nearer ones may round to one where symmetry mirrors them.
+const LEAST_STEP_DEG: f64 = 1e-4;
 
 /// The web in a file; `notes` gets a sentence for whatever was not taken as it stands.
 pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<PhotometricWeb, LoadError> {
@@ -29,7 +33,9 @@ pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<PhotometricWe
     let horizontal_count = numbers.count("the number of horizontal angles", 1)?;
     if vertical_count * horizontal_count > MAX_INTENSITIES {
         let problem = format_args!(
-            "{vertical_count} vertical by {horizontal_count} horizontal angles: at most {MAX_INTENSITIES} intensities are read"
+            "{vertical_count} vertical by {horizontal_count} horizontal angles (line {}): at most {MAX_INTENSITIES} \
+             intensities are read",
+            numbers.line
         );
         return Err(LoadError::too_large(path, problem));
     }
@@ -93,8 +99,10 @@ fn skip_tilt(numbers: &mut Numbers, tilt: &str, line: usize, notes: &mut Vec<Str
 /// of 1986, which has no first line of its own, and 1991. Since 1995 it is reserved, since 2019 a code of how the file
 /// was made.
 fn has_lamp_factor(text: &str) -> bool {
-    let edition = text.lines().next().unwrap_or_default().trim();
-    let is_named = edition.starts_with("IESNA:LM-63-") || edition.starts_with("IES:LM-63-");
+    let first = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
+    // Writers spell it "IESNA:LM-63-2002", "IES:LM-63-2019", "IESNA LM63-1995".
+    let edition = first.to_ascii_uppercase().replace('-', "");
+    let is_named = edition.contains("LM63");
     !is_named || edition.ends_with("86") || edition.ends_with("91")
 }
 
@@ -142,7 +150,9 @@ fn all_around(planes: Vec<Plane>, place: &Place, notes: &mut Vec<String>) -> Res
 /// The planes, and on the other side of the last one the same again.
 fn mirrored(planes: Vec<Plane>) -> Vec<Plane> {
     let last = planes.last().map_or(0.0, |(angle, _)| *angle);
-    let others: Vec<Plane> = planes.iter().rev().skip(1).map(|(c, plane)| (2.0 * last - c, plane.clone())).collect();
+    // Rounded once: what lies apart by LEAST_STEP_DEG stays apart.
+    let mirror = |c: f32| (2.0 * f64::from(last) - f64::from(c)) as f32;
+    let others: Vec<Plane> = planes.iter().rev().skip(1).map(|(c, plane)| (mirror(*c), plane.clone())).collect();
     planes.into_iter().chain(others).collect()
 }
 
@@ -157,7 +167,10 @@ struct Number {
 impl Number {
     /// An error about it; `rule` is what would be right.
     fn error(self, numbers: &Numbers, rule: &str) -> LoadError {
-        LoadError::invalid_at(Place::line(numbers.file, self.line), format_args!("{rule}, not {}", self.value))
+        LoadError::invalid_at(
+            Place::line(numbers.file, self.line),
+            format_args!("{rule}, not {}", significant(self.value, 6)),
+        )
     }
 
     fn above_0(self, what: &str, numbers: &Numbers) -> Result<f64, LoadError> {
@@ -186,7 +199,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// The next one; `what` names it where it is missing or no number.
-    fn next(&mut self, what: &str) -> Result<Number, LoadError> {
+    fn next(&mut self, what: impl std::fmt::Display) -> Result<Number, LoadError> {
         let place = |line| Place::line(self.file, line);
         let Some((line, word)) = self.words.next() else {
             return Err(LoadError::invalid_at(place(self.line), format_args!("the file ends before {what}")));
@@ -220,15 +233,17 @@ impl<'a> Numbers<'a> {
     fn angles(&mut self, kind: &str, count: usize, most: f64) -> Result<Vec<f32>, LoadError> {
         let mut angles: Vec<f32> = Vec::new();
         for _ in 0..count {
-            let number = self.next(&format!("{count} {kind} angles"))?;
+            let number = self.next(format_args!("{count} {kind} angles"))?;
             if !(0.0..=most).contains(&number.value) {
                 return Err(number.error(self, &format!("{kind} angles lie in [0, {most}]")));
             }
-            let angle = number.value as f32;
-            if let Some(before) = angles.last().filter(|&&before| before >= angle) {
-                return Err(number.error(self, &format!("{kind} angles must rise: above {before}")));
+            if let Some(&before) = angles.last()
+                && number.value < f64::from(before) + LEAST_STEP_DEG
+            {
+                let rule = format!("{kind} angles must rise, by {LEAST_STEP_DEG} at the least: above {before}");
+                return Err(number.error(self, &rule));
             }
-            angles.push(angle);
+            angles.push(number.value as f32);
         }
         Ok(angles)
     }
@@ -244,10 +259,11 @@ impl<'a> Numbers<'a> {
         let mut intensities = Vec::new();
         let mut first_negative = None;
         for _ in 0..per_plane * planes {
-            let number = self.next(&format!("{planes} times {per_plane} intensities"))?;
+            let number = self.next(format_args!("{planes} times {per_plane} intensities"))?;
             let intensity = (number.value * scale) as f32;
             if !intensity.is_finite() {
-                return Err(number.error(self, &format!("an intensity (times {scale}) must be below 3e38 cd")));
+                return Err(number
+                    .error(self, &format!("an intensity (times {}) must be below 3e38 cd", significant(scale, 6))));
             }
             if intensity < 0.0 {
                 first_negative.get_or_insert(number.line);
@@ -322,6 +338,7 @@ mod tests {
         let tail = "0 45 90\n0 90\n90 40 0\n90 10 0\n";
         let layouts = [
             format!("a lamp, tested by nobody\nTILT=NONE\n1 100 2 3 2 1 1 0 0 0\n1 0.5 50\n{tail}"),
+            format!("\niesna:lm63-1995\nTILT=NONE\n1 -1 1 3 2 1 2 0 0 0\n1 2 50\n{tail}"),
             format!("IESNA91\r\n[TEST] x\r\nTILT=NONE\r\n1,100,2,3,2,1,1,0,0,0\r\n0.25,2,50\r\n{tail}\u{1a}"),
             format!("IESNA:LM-63-1995\n[MORE] TILTED\n  tilt = none \n1 -1 0.5\n3 2 1\n2 0 0 0\n2 7 50\n{tail}"),
             format!("\u{feff}IESNA:LM-63-1991\nTILT=NONE\n1 -1 0.5 3 2 1 2 0 0 0\n1 2 50\n{tail}"),
@@ -375,13 +392,13 @@ mod tests {
             (
                 " 3 2 1 2",
                 " 30000 30000 1 2",
-                "30000 vertical by 30000 horizontal angles: at most 2000000 intensities are read",
+                "30000 vertical by 30000 horizontal angles (line 5): at most 2000000 intensities are read",
             ),
             (" 3 2 1 2", " 3 2 2 2", "a.ies:5: photometry of type B is not read; type C (1) is"),
             (" 3 2 1 2", " 3 2 3 2", "a.ies:5: photometry of type A is not read; type C (1) is"),
             (" 3 2 1 2", " 3 2 4 2", "a.ies:5: the photometric type is 1 (C), 2 (B) or 3 (A), not 4"),
             ("1 1 50", "0 1 50", "a.ies:6: the ballast factor must be above 0, not 0"),
-            ("0 45 90", "0 45 45", "a.ies:7: vertical angles must rise: above 45, not 45"),
+            ("0 45 90", "0 45 45", "a.ies:7: vertical angles must rise, by 0.0001 at the least: above 45, not 45"),
             ("0 45 90", "0 45 190", "a.ies:7: vertical angles lie in [0, 180], not 190"),
             ("0 45 90", "-90 0 90", "a.ies:7: vertical angles lie in [0, 180], not -90"),
             (
@@ -390,12 +407,21 @@ mod tests {
                 "a.ies:8: horizontal angles are one alone, or run from 0 to 90, 180 or 360, or from 90 to 270, not from 0 to 120",
             ),
             ("\n0 90\n", "\n10 90\n", "not from 10 to 90"),
-            ("\n0 90\n", "\n90 0\n", "a.ies:8: horizontal angles must rise: above 90, not 0"),
+            ("\n0 90\n", "\n90 0\n", "a.ies:8: horizontal angles must rise, by 0.0001 at the least: above 90, not 0"),
             ("9 3 0", "9 nan 0", "a.ies:9: expected 2 times 3 intensities, found \"nan\""),
-            ("9 3 0", "9 1e39 0", "a.ies:9: an intensity (times 1) must be below 3e38 cd, not 1"),
+            ("9 3 0", "9 1e39 0", "a.ies:9: an intensity (times 1) must be below 3e38 cd, not 1e39"),
             ("9 3 0", "9 3", "a.ies:9: the file ends before 2 times 3 intensities"),
             ("0 45 90\n0 90\n9 1 0 9 3 0", "", "a.ies:6: the file ends before 3 vertical angles"),
         ];
+        // Their mirror images round to one.
+        for horizontal in
+            ["0 0.000001 90", "0 22.5 22.500003 90", "0 45 89.99999 90", "0 0.000001 180", "90 90.000005 270"]
+        {
+            let planes = "9 1 0 ".repeat(horizontal.split(' ').count());
+            let message = read_text(&file(horizontal, &planes)).0.expect_err(horizontal);
+            let expected = "a.ies:8: horizontal angles must rise, by 0.0001 at the least";
+            assert!(message.contains(expected), "{message}");
+        }
         for (good_part, bad_part, expected) in cases {
             assert!(good.contains(good_part), "{good_part}");
             let message = read_text(&good.replacen(good_part, bad_part, 1)).0.expect_err(expected);

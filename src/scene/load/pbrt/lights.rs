@@ -9,8 +9,9 @@ use super::Reader;
 use super::inputs::Meaning;
 use super::parameters::Parameters;
 use crate::scene::{ColorInput, Encoding, Environment, Light, Parametrisation, PhotometricWeb, SpotFalloff, Wrap};
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Mat3, Vec3};
 use std::f32::consts::{PI, TAU};
+use std::path::Path;
 use std::sync::Arc;
 
 /// What an area light gives.
@@ -20,6 +21,9 @@ pub(super) struct Emission {
     /// Luminous power of each shape, for which `radiance` is scaled once its area is known.
     pub(super) lumen: Option<f32>,
 }
+
+/// From a goniometric light's space into its picture's, whose z is the light's y (pbrt-v4, `GoniometricLight::Create`).
+const SWAP_Y_AND_Z: Mat3 = Mat3::from_cols(Vec3::X, Vec3::Z, Vec3::Y);
 
 impl Reader<'_> {
     /// Reads `LightSource`.
@@ -108,8 +112,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A point whose intensity is a picture's: the mean of R, G and B in pbrt's equal-area square, whose z is the
-    /// light's y (pbrt-v4, `GoniometricLight::Create`).
+    /// A point whose intensity is a picture's: the mean of R, G and B in pbrt's equal-area square.
     fn goniometric(&mut self, parameters: &Parameters, to_world: &Affine3A) -> Result<(), LoadError> {
         let position = Vec3::from(to_world.translation);
         let Some(file) = parameters.string("filename")? else {
@@ -119,20 +122,31 @@ impl Reader<'_> {
             self.builder.lights.push(Light::Point { position, intensity });
             return Ok(());
         };
-        let file = self.file(file);
-        let picture = environment::read(&file, Parametrisation::EqualArea, &mut self.builder.notes)
+        let web = self.goniometric_web(&self.file(file), parameters)?;
+        if web.max_cd() <= 0.0 {
+            self.builder
+                .note(format!("{}: a goniometric light whose picture is black gives none.", parameters.place()));
+            return Ok(());
+        }
+        let per_candela = self.light_color(parameters, "I", web.flux_lm() as f32)?;
+        let from_world = SWAP_Y_AND_Z * environment::rotation_of(to_world).transpose();
+        self.builder.lights.push(Light::Photometric { position, from_world, web, per_candela });
+        Ok(())
+    }
+
+    /// The web of a picture, read once; its poles are the picture's.
+    fn goniometric_web(&mut self, file: &Path, parameters: &Parameters) -> Result<Arc<PhotometricWeb>, LoadError> {
+        if let Some(known) = self.goniometric_webs.get(file) {
+            return Ok(Arc::clone(known));
+        }
+        let picture = environment::read(file, Parametrisation::EqualArea, &mut self.builder.notes)
             .map_err(|error| error.referenced_from(parameters.place()))?;
-        let mean = picture.texels.iter().map(|texel| f64::from(texel.element_sum()) / 3.0).sum::<f64>();
-        let mean = (mean / picture.texels.len() as f64) as f32;
         // A texel is about 203°/width across (4π/width² sr): a quarter of that, or of a degree where it is smaller.
         let step_deg = 180.0 / (4 * picture.width).clamp(180, 720) as f32;
-        let web = PhotometricWeb::from_directions(step_deg, |direction| {
-            picture.radiance(Vec3::new(direction.x, direction.z, direction.y)).element_sum() / 3.0
-        });
-        let per_candela = self.light_color(parameters, "I", (2.0 * TAU * mean).max(f32::MIN_POSITIVE))?;
-        let from_world = environment::rotation_of(to_world).transpose();
-        self.builder.lights.push(Light::Photometric { position, from_world, web: Arc::new(web), per_candela });
-        Ok(())
+        let web = PhotometricWeb::from_directions(step_deg, |own| picture.radiance(own).element_sum() / 3.0);
+        let web = Arc::new(web);
+        self.goniometric_webs.insert(file.to_owned(), Arc::clone(&web));
+        Ok(web)
     }
 
     fn infinite(&mut self, parameters: &Parameters, to_world: &Affine3A) -> Result<Environment, LoadError> {
