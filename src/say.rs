@@ -75,3 +75,25 @@ pub fn answered(written: io::Result<()>) {
         let _ = FAILURE.set(error);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// Other tests may say something meanwhile, too.
+    #[test]
+    fn what_stands_on_the_terminal_makes_way() {
+        let ways = Arc::new(AtomicUsize::new(0));
+        let counted = Arc::clone(&ways);
+        beside(Some(Box::new(move |write| {
+            counted.fetch_add(1, Ordering::Relaxed);
+            write();
+        })));
+        part(format_args!(""));
+        assert!(ways.load(Ordering::Relaxed) > 0);
+        beside(None);
+        assert_eq!(Arc::strong_count(&ways), 1, "what stood there is gone");
+    }
+}

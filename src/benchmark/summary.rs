@@ -10,8 +10,8 @@ pub const INTERVAL_LEVEL: f64 = 0.95;
 /// [`INTERVAL_LEVEL`].
 ///
 /// The interval is Student's t on the logarithms: seeds within scenes are what is drawn. Scenes are not (another choice
-/// of scenes has another mean), nor is the reference, whose error all seeds share. Percentiles of a
-/// bootstrap are too narrow with 2 to 5 seeds: they cover 49 to 90 % where 95 are claimed.
+/// of scenes has another mean), nor is the reference, whose error all seeds share. Percentiles of a bootstrap
+/// are too narrow with 2 to 5 seeds: they cover 49 to 90 % where 95 are claimed.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct GeometricMean {
     /// The mean.

@@ -3,7 +3,7 @@
 mod sequence;
 
 use super::animate::parse_rate;
-use super::finished::all_written;
+use super::finished::{all_written, write_figures};
 use super::kept_tone::shown_by;
 use super::maps::check_map;
 use super::picture::{Ground, InputPicture, Shape, Source};
@@ -13,7 +13,6 @@ use super::words::OF_THE_MODEL;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::adaptive::settings::THRESHOLD;
-use fechner::json_file;
 use fechner::output::{self, false_colour};
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
@@ -131,7 +130,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         say!("{}: {}", path.display(), write_map(path, &difference)?);
         Ok(())
     });
-    let json = arguments.json.as_ref().map_or(Ok(()), |path| Ok(json_file::write(path, &figures)?));
+    let json = write_figures(arguments.json.as_deref(), &figures);
     all_written([map, json])?;
     Ok(ExitCode::from(u8::from(figures.seen.is_visible)))
 }

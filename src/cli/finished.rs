@@ -6,8 +6,10 @@ use super::words::in_a_line;
 use anyhow::bail;
 use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
+use fechner::json_file;
 use fechner::output::rendered::Background;
 use fechner::output::{self, PartOf, PictureFormat};
+use serde::Serialize;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -69,6 +71,11 @@ fn kept_elsewhere(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>, erro
         Ok(elsewhere) => error.context(format!("the picture is in {}", elsewhere.display())),
         Err(_) => error,
     }
+}
+
+/// Writes figures, where somebody wants them.
+pub(super) fn write_figures(path: Option<&Path>, figures: &impl Serialize) -> anyhow::Result<()> {
+    path.map_or(Ok(()), |path| Ok(json_file::write(path, figures)?))
 }
 
 /// All that could not be written, in one error.

@@ -1,7 +1,7 @@
 //! `fechner merge`: films of different seeds in, one film or its picture out.
 
 use super::claim::Claim;
-use super::finished::{Finished, PictureTarget, all_written};
+use super::finished::{Finished, PictureTarget, all_written, write_figures};
 use super::numbers::parse_positive;
 use super::report::{Report, summary};
 use super::targets::{check_distinct, check_kept};
@@ -10,7 +10,6 @@ use fechner::adaptive::judge::judge;
 use fechner::adaptive::settings::{Limits, THRESHOLD};
 use fechner::adaptive::{Rendered, StopReason, is_reached};
 use fechner::checkpoint::{merge_files, write_checkpoint};
-use fechner::json_file;
 use fechner::output::rendered::Background;
 use fechner::output::{self, PictureFormat};
 use std::path::{Path, PathBuf};
@@ -76,7 +75,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
         let part_of = merged.header.origin.part_of();
         PictureTarget { path: &arguments.output, format, background, part_of }.write_here_or_elsewhere(finished)
     });
-    let figures = arguments.json.as_ref().map_or(Ok(()), |path| Ok(json_file::write(path, &report)?));
+    let figures = write_figures(arguments.json.as_deref(), &report);
     say!("Films of the seeds {}:", merged.header.seeds.in_words());
     say!("{}", summary(finished, None));
     all_written([picture, figures])

@@ -2,7 +2,7 @@
 
 use super::CALL_AGAIN;
 use super::console::Console;
-use super::finished::{Finished, PictureTarget, all_written};
+use super::finished::{Finished, PictureTarget, all_written, write_figures};
 use super::job::{JobArguments, Prepared};
 use super::keeper::{CheckpointArguments, Keeper, SeedsSoFar, Start, Watch};
 use super::maps::{MapTarget, check_map};
@@ -20,7 +20,6 @@ use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{self, StopReason};
 use fechner::checkpoint::{Header, Origin, SettingsRecord};
 use fechner::integrator::{Crop, PathTracer, TraceSettings};
-use fechner::json_file;
 use fechner::output::{self, PartOf, PictureFormat};
 use fechner::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -178,7 +177,7 @@ impl FilesWritten {
             say!("{}", map.write(rendered, settings.limits.visibility_or_threshold())?);
             Ok(())
         }));
-        let figures = arguments.json.as_ref().map_or(Ok(()), |path| Ok(json_file::write(path, report)?));
+        let figures = write_figures(arguments.json.as_deref(), report);
         Self { picture, maps, figures }
     }
 

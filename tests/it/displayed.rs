@@ -453,16 +453,6 @@ fn nothing_is_rendered_for_pixels_that_are_not_square() {
     run(folder.path(), &["tonemap", "a.exr", "-o", "a.png", "--operator", "absolute", "--display", "wide.toml"]);
 }
 
-/// A value that no display has was told without its line.
-#[test]
-fn a_wrong_value_of_a_display_is_named_with_its_line() {
-    let folder = tempfile::tempdir().expect("a folder");
-    write(folder.path(), "a.exr", |_| [50.0; 3]);
-    std::fs::write(folder.path().join("dark.toml"), "name = 'dark'\n# nits\nwhite_cd_m2 = 0").expect("written");
-    let (code, said) = fechner(folder.path(), &["compare", "a.exr", "a.exr", "--display", "dark.toml"]);
-    assert!(code == 2 && said.contains("dark.toml:3: white_cd_m2 is 0; it must be"), "{said}");
-}
-
 /// Who names no display sees a render on the one that it was made for.
 #[test]
 fn a_render_is_seen_on_its_own_display() {

@@ -2,6 +2,7 @@
 
 use super::{CompareArguments, Figures, Seen, check_alike, write_map};
 use crate::cli::channels;
+use crate::cli::finished::write_figures;
 use crate::cli::kept_tone::{as_rendered, first_scene};
 use crate::cli::maps::check_map;
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
@@ -10,7 +11,6 @@ use crate::cli::words::{OF_THE_MODEL, count, listed};
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::animate::spread_over;
-use fechner::json_file;
 use fechner::output;
 use fechner_perception::csf;
 use fechner_perception::display::Viewing;
@@ -324,9 +324,7 @@ impl<'a> Sequences<'a> {
             figures.frames_per_second,
             if figures.eye_follows { "follows what moves" } else { "rests" },
         );
-        if let Some(path) = &self.arguments.json {
-            json_file::write(path, &figures)?;
-        }
+        write_figures(self.arguments.json.as_deref(), &figures)?;
         Ok(ExitCode::from(u8::from(seen.is_visible)))
     }
 }

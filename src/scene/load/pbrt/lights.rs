@@ -22,6 +22,13 @@ pub(super) struct Emission {
     pub(super) lumen: Option<f32>,
 }
 
+/// A goniometric light's picture, and its flux in lm, which takes as long as reading it.
+#[derive(Clone)]
+pub(super) struct GoniometricWeb {
+    web: Arc<PhotometricWeb>,
+    flux_lm: f64,
+}
+
 /// From a goniometric light's space into its picture's, whose z is the light's y (pbrt-v4, `GoniometricLight::Create`).
 const SWAP_Y_AND_Z: Mat3 = Mat3::from_cols(Vec3::X, Vec3::Z, Vec3::Y);
 
@@ -122,30 +129,30 @@ impl Reader<'_> {
             self.builder.lights.push(Light::Point { position, intensity });
             return Ok(());
         };
-        let web = self.goniometric_web(&self.file(file), parameters)?;
-        if web.max_cd() <= 0.0 {
+        let GoniometricWeb { web, flux_lm } = self.goniometric_web(&self.file(file), parameters)?;
+        if flux_lm <= 0.0 {
             self.builder
                 .note(format!("{}: a goniometric light whose picture is black gives none.", parameters.place()));
             return Ok(());
         }
-        let per_candela = self.light_color(parameters, "I", web.flux_lm() as f32)?;
+        let per_candela = self.light_color(parameters, "I", flux_lm as f32)?;
         let from_world = SWAP_Y_AND_Z * environment::rotation_of(to_world).transpose();
         self.builder.lights.push(Light::Photometric { position, from_world, web, per_candela });
         Ok(())
     }
 
     /// The web of a picture, read once; its poles are the picture's.
-    fn goniometric_web(&mut self, file: &Path, parameters: &Parameters) -> Result<Arc<PhotometricWeb>, LoadError> {
+    fn goniometric_web(&mut self, file: &Path, parameters: &Parameters) -> Result<GoniometricWeb, LoadError> {
         if let Some(known) = self.goniometric_webs.get(file) {
-            return Ok(Arc::clone(known));
+            return Ok(known.clone());
         }
         let picture = environment::read(file, Parametrisation::EqualArea, &mut self.builder.notes)
             .map_err(|error| error.referenced_from(parameters.place()))?;
         // A texel is about 203°/width across (4π/width² sr): a quarter of that, or of a degree where it is smaller.
         let step_deg = 180.0 / (4 * picture.width).clamp(180, 720) as f32;
         let web = PhotometricWeb::from_directions(step_deg, |own| picture.radiance(own).element_sum() / 3.0);
-        let web = Arc::new(web);
-        self.goniometric_webs.insert(file.to_owned(), Arc::clone(&web));
+        let web = GoniometricWeb { flux_lm: web.flux_lm(), web: Arc::new(web) };
+        self.goniometric_webs.insert(file.to_owned(), web.clone());
         Ok(web)
     }
 

@@ -20,14 +20,13 @@ mod transforms;
 use super::LoadOptions;
 use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
 use super::error::{LoadError, Place, no_such};
-use crate::scene::{Alpha, Material, MaterialId, MeshId, PhotometricWeb, ScalarInput, Scene, Surface};
+use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
 use parameters::Parameters;
 use state::{Opening, State, Transforms};
 use std::collections::{HashMap, HashSet};
 use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use std::sync::Arc;
 
 /// Reads a pbrt file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
@@ -136,7 +135,7 @@ struct Reader<'a> {
     /// Objects that were placed before they were there.
     uses_ahead: Vec<UseOfObject>,
     /// Webs of goniometric lights by their pictures.
-    goniometric_webs: HashMap<PathBuf, Arc<PhotometricWeb>>,
+    goniometric_webs: HashMap<PathBuf, lights::GoniometricWeb>,
     current_object: Option<String>,
     /// Kind and name of what the file has defined so far.
     defined: HashSet<(&'static str, String)>,

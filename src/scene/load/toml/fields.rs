@@ -5,6 +5,7 @@
 
 use super::super::error::{LoadError, Place, nearest, one_line, suggestion, unknown};
 use super::super::lines::LineStarts;
+use crate::digits::significant;
 use glam::{Vec2, Vec3};
 use std::path::Path;
 use toml::Spanned;
@@ -52,8 +53,6 @@ pub(super) struct Fields<'a> {
     path: String,
     line: usize,
     table: &'a DeTable<'a>,
-    /// Whether each key is known to be right.
-    is_checked: bool,
 }
 
 impl<'a> Value<'a> {
@@ -107,7 +106,7 @@ impl<'a> Value<'a> {
         if (number as f32) > 0.0 {
             Ok(number)
         } else {
-            Err(self.error(format_args!("must be above 0, not {}", figure(number))))
+            Err(self.error(format_args!("must be above 0, not {}", significant(number, 9))))
         }
     }
 
@@ -122,9 +121,9 @@ impl<'a> Value<'a> {
         if (low..=high).contains(&number) {
             Ok(number)
         } else if high.is_infinite() {
-            Err(self.error(format_args!("must be at least {low}, not {}", figure(number))))
+            Err(self.error(format_args!("must be at least {low}, not {}", significant(number, 9))))
         } else {
-            Err(self.error(format_args!("must lie in [{low}, {high}], not {}", figure(number))))
+            Err(self.error(format_args!("must lie in [{low}, {high}], not {}", significant(number, 9))))
         }
     }
 
@@ -235,13 +234,13 @@ impl<'a> Value<'a> {
     pub(super) fn fields(&self, known: &[&str]) -> Result<Fields<'a>, LoadError> {
         let fields = self.entries()?;
         fields.check_known(known)?;
-        Ok(Fields { is_checked: true, ..fields })
+        Ok(fields)
     }
 
     /// The keys of a table, whatever they are: names that the author chose.
     pub(super) fn entries(&self) -> Result<Fields<'a>, LoadError> {
         let table = self.value.as_table().ok_or_else(|| self.wrong_type("a table"))?;
-        Ok(Fields { source: self.source, path: self.path.clone(), line: self.line, table, is_checked: false })
+        Ok(Fields { source: self.source, path: self.path.clone(), line: self.line, table })
     }
 }
 
@@ -250,12 +249,12 @@ impl<'a> Fields<'a> {
     pub(super) fn root(source: &'a Source<'a>, table: &'a DeTable<'a>, known: &[&str]) -> Result<Self, LoadError> {
         let fields = Self::of_any(source, table);
         fields.check_known(known)?;
-        Ok(Self { is_checked: true, ..fields })
+        Ok(fields)
     }
 
     /// The file's topmost table, whatever its keys are.
     pub(super) fn of_any(source: &'a Source<'a>, table: &'a DeTable<'a>) -> Self {
-        Self { source, path: String::new(), line: 1, table, is_checked: false }
+        Self { source, path: String::new(), line: 1, table }
     }
 
     /// Refuses keys that are not in the list.
@@ -295,9 +294,13 @@ impl<'a> Fields<'a> {
     }
 
     pub(super) fn require(&self, key: &str) -> Result<Value<'a>, LoadError> {
+        self.get(key).ok_or_else(|| self.error(format_args!("\"{key}\" is missing")))
+    }
+
+    /// The same of a table whose keys were not checked, where another one may be meant for it.
+    pub(super) fn require_of_any(&self, key: &str) -> Result<Value<'a>, LoadError> {
         self.get(key).ok_or_else(|| {
-            let unsure = self.table.keys().filter(|_| !self.is_checked);
-            let written = nearest(key, unsure.map(|key| key.get_ref().as_ref()));
+            let written = nearest(key, self.table.keys().map(|key| key.get_ref().as_ref()));
             let slip = written.map_or_else(String::new, |written| format!("; is \"{written}\" meant for it?"));
             self.error(format_args!("\"{key}\" is missing{slip}"))
         })
@@ -352,10 +355,4 @@ fn describe(value: &DeValue<'_>) -> String {
         DeValue::Array(array) => format!("a list of {}", array.len()),
         DeValue::Table(_) => "a table".to_owned(),
     }
-}
-
-/// A number as people read it: no three hundred digits.
-fn figure(number: f64) -> String {
-    let is_long = number != 0.0 && !(1e-9..1e15).contains(&number.abs());
-    if is_long { format!("{number:e}") } else { number.to_string() }
 }

@@ -30,7 +30,7 @@ impl<'a> Reader<'a> {
     /// Reads one light.
     pub(super) fn read(&mut self, value: &Value) -> Result<Light, LoadError> {
         let kinds = ["point", "spot", "photometric", "directional"].map(|kind| (kind, kind));
-        match value.entries()?.require("type")?.choice(&kinds)? {
+        match value.entries()?.require_of_any("type")?.choice(&kinds)? {
             "point" => self.point(value),
             "spot" => self.spot(value),
             "photometric" => self.photometric(value),

@@ -75,7 +75,7 @@ impl<'a> Materials<'a> {
         value: &Value<'a>,
     ) -> Result<(), LoadError> {
         let kinds = surface::kinds();
-        let kind = value.entries()?.require("type")?;
+        let kind = value.entries()?.require_of_any("type")?;
         let choices: Vec<(&'static str, usize)> =
             kinds.iter().enumerate().map(|(place, kind)| (kind.0, place)).collect();
         let (_, read_surface, own) = kinds[kind.choice(&choices)?];
